@@ -136,6 +136,9 @@ json::object configuration_json(const ConfigurationResult& result, const GraphRe
     std::vector<std::string> notes = first.notes;
     notes.insert(notes.end(), result.doubts.begin(), result.doubts.end());
     all["notes"] = strings_json(notes);
+    std::vector<std::string> doubts = first.doubts;
+    doubts.insert(doubts.end(), result.doubts.begin(), result.doubts.end());
+    all["doubts"] = strings_json(doubts);
   }
   all["peak_memory_bytes"] =
       result.peak_memory > 0 ? json::value(result.peak_memory) : json::value(nullptr);

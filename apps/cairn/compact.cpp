@@ -401,7 +401,7 @@ int run_compact(const CompactOptions& options, Session& session) {
   results.add([&] { session.print(summary_text(options, outcome, results, session)); });
   results.finish();
   if (guard.interrupted()) return kExitInterrupted;
-  for (const std::string& doubt : notes_on_estimate(shown.compact, chi2(shown.compact)))
+  for (const std::string& doubt : notes_on_estimate(shown.compact, chi2(shown.compact)).notes)
     session.note(doubt);
   if (!shown.located) {
     const auto waiting = shown.verdicts.find("waiting");

@@ -317,6 +317,7 @@ json::object report_json(const MarginalsOptions& options, const LoadedGraph& loa
                        {"marginals", answer.marginals}};
   report["solver"] = solver_json(stats);
   report["notes"] = strings_json(summary ? summary->notes : std::vector<std::string>{});
+  report["doubts"] = strings_json(summary ? summary->doubts : std::vector<std::string>{});
   report["read_notes"] = strings_json(sentences(loaded.report));
   report["output"] = text_json(options.output);
   add_blocks(loaded.graph, request, answer, report);
@@ -449,7 +450,7 @@ std::string result_text(const MarginalsOptions& options, const LoadedGraph& load
     facts.add(
         {"estimate", fmt::format("{}, chi2 {}, {}", summary->optimizer,
                                  chi2_text(summary->final_chi2), to_string(summary->status))});
-    for (const std::string& note : summary->notes) facts.add({"note", note});
+    add_notes(facts, summary->notes, summary->doubts);
   }
   facts.add(
       {"time", fmt::format("factorize {}, covariances {} ({})", seconds_text(answer.factorize),
@@ -472,10 +473,9 @@ std::optional<Summary> optimize(Graph& graph, Optimizer* optimizer, const Proble
   GuessProgress of_guess(session.common.quiet, guard.flag());
   setup.look_again(graph, *optimizer, options.optimizer, stop, progress, std::ref(of_guess),
                    summary);
-  for (std::string& note : notes_on_the_end(summary, stop, graph))
-    summary.notes.push_back(std::move(note));
+  note_the_end(summary, stop, graph);
   if (summary.status != Status::interrupted && summary.status != Status::converged) {
-    summary.notes.push_back(fmt::format(
+    summary.doubt(fmt::format(
         "the optimisation ended as {}: covariances are of where it stopped, which is not a minimum",
         to_string(summary.status)));
   }

@@ -423,7 +423,7 @@ int run(OnlineOptions options, Session& session) {
       write_map(graph, options.output, session);
       if (const std::string lost = losses_not_written(graph); !lost.empty()) session.note(lost);
       if (!failure) {  // within an update it may have been left in part
-        std::vector<std::string> notes = notes_on_estimate(graph, chi2(graph));
+        std::vector<std::string> notes = notes_on_estimate(graph, chi2(graph)).notes;
         note_what_is_free(graph, notes);
         for (const std::string& note : notes) session.note(note);
       }

@@ -95,6 +95,7 @@ json::object report_json(const OptimizeOptions& options, const LoadedGraph& load
   report["solver"] = solver_json(summary.solver);
   report["covariance"] = to_json(covariances, loaded.graph);
   report["notes"] = strings_json(summary.notes);
+  report["doubts"] = strings_json(summary.doubts);
   report["read_notes"] = strings_json(sentences(loaded.report));
   report["output"] = text_json(options.output);
   report["recording"] = text_json(options.record);
@@ -137,7 +138,7 @@ std::string summary_text(const OptimizeOptions& options, const LoadedGraph& load
                fmt::format("of {} by {} in {}", plural(loaded.graph.variable_count(), "variable"),
                            covariances.linear_solver, seconds_text(covariances.seconds()))});
   }
-  for (const std::string& note : summary.notes) table.add({"note", note});
+  add_notes(table, summary.notes, summary.doubts);
   for (const std::string& file : results.written({options.output})) table.add({"output", file});
   for (const std::string& file : results.written({options.record})) table.add({"recording", file});
   return table.text(false);
@@ -196,8 +197,7 @@ int run(const OptimizeOptions& options, Session& session) {
       summary.notes.push_back(std::move(lost));
   });
   const Stop& stop = options.problem.stop;
-  for (std::string& note : notes_on_the_end(summary, stop, loaded.graph))
-    summary.notes.push_back(std::move(note));
+  note_the_end(summary, stop, loaded.graph);
   DiagonalCovariances covariances;
   if (covariance_solver && exit_code(summary, stop) == 0) {
     covariances =

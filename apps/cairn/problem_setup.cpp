@@ -87,9 +87,8 @@ void ProblemSetup::look_again(Graph& graph, Optimizer& optimizer, std::string_vi
                     std::move(go_on), summary);
 }
 
-std::vector<std::string> notes_on_the_end(const Summary& summary, const Stop& stop,
-                                          const Graph& graph) {
-  return cairn::notes_on_the_end(summary, stop, graph, "--iterations");
+void note_the_end(Summary& summary, const Stop& stop, const Graph& graph) {
+  cairn::note_the_end(summary, stop, graph, "--iterations");
 }
 
 int exit_code(const Summary& summary, const Stop& stop) {

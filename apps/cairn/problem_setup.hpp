@@ -60,8 +60,7 @@ class ProblemSetup {
 };
 
 /// As of the library, with the program's name of the limit.
-std::vector<std::string> notes_on_the_end(const Summary& summary, const Stop& stop,
-                                          const Graph& graph);
+void note_the_end(Summary& summary, const Stop& stop, const Graph& graph);
 
 /// 0 where it converged, or had no tolerance to reach; else that of a numerical failure, or of an
 /// interruption.

@@ -248,8 +248,10 @@ int run(const ReplayOptions& options, Session& session) {
   }
   const double chi2 = estimator->chi2();
   if (!replay.interrupted) {
-    for (std::string& doubt : notes_on_estimate(estimator->graph(), chi2))
-      replay.notes.push_back(std::move(doubt));
+    NotesOnEstimate said = notes_on_estimate(estimator->graph(), chi2);
+    if (!replay.steps.empty()) replay.doubts = replay.steps.back().report.doubts;
+    replay.notes.insert(replay.notes.end(), said.notes.begin(), said.notes.end());
+    replay.doubts.insert(replay.doubts.end(), said.doubts.begin(), said.doubts.end());
     note_what_is_free(estimator->graph(), replay.notes);
   }
   results.add(

@@ -141,6 +141,7 @@ json::object report_json(const ReplayOptions& options, const LoadedGraph& loaded
   report["checks"] = checks_json(replay);
   report["estimator_memory_bytes"] = estimator.memory();
   report["notes"] = strings_json(replay.notes);
+  report["doubts"] = strings_json(replay.doubts);
   report["read_notes"] = strings_json(sentences(loaded.report));
   report["output"] = text_json(options.output);
   end_report(report);
@@ -210,10 +211,7 @@ std::string summary_text(const ReplayOptions& options, const LoadedGraph& loaded
   if (replay.failed > 0)
     table.add({"failed", plural(replay.failed, "update") + ": H was not positive definite"});
   constexpr std::size_t kMostNotes = 5;
-  for (std::size_t k = 0; k < std::min(kMostNotes, replay.notes.size()); ++k)
-    table.add({"note", replay.notes[k]});
-  if (replay.notes.size() > kMostNotes)
-    table.add({"", fmt::format("and {} more: --json", replay.notes.size() - kMostNotes)});
+  add_notes(table, replay.notes, replay.doubts, kMostNotes);
   for (const std::string& file : results.written({options.output, options.steps, options.plot}))
     table.add({"output", file});
   return table.text(false);

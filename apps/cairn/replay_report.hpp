@@ -64,6 +64,7 @@ struct Replay {
   std::string removal_note;  ///< why more stay than should
   int failed = 0;            ///< updates whose H was not positive definite
   std::vector<std::string> notes;
+  std::vector<std::string> doubts;  ///< of the last estimate; each is among the notes
   bool interrupted = false;
 };
 

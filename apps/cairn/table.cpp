@@ -272,4 +272,20 @@ std::string joined(std::span<const std::string> parts, std::string_view between)
   return text;
 }
 
+void add_notes(Table& table, const std::vector<std::string>& notes,
+               const std::vector<std::string>& doubts, std::size_t most) {
+  for (const std::string& doubt : doubts) table.add({"doubt", doubt});
+  std::size_t left = most - std::min(most, doubts.size()), more = 0;
+  for (const std::string& note : notes) {
+    if (std::ranges::find(doubts, note) != doubts.end()) continue;
+    if (left == 0) {
+      ++more;
+      continue;
+    }
+    --left;
+    table.add({"note", note});
+  }
+  if (more > 0) table.add({"", fmt::format("and {} more: --json", more)});
+}
+
 }  // namespace cairn::app

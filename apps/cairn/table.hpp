@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <limits>
 #include <span>
 #include <string>
 #include <string_view>
@@ -93,5 +94,11 @@ std::string plural(std::int64_t count, std::string_view noun);
 /// The parts, with `between` between each two. What fmt::join does, without its templates, which
 /// take a fifth of a second in each file.
 std::string joined(std::span<const std::string> parts, std::string_view between);
+
+/// A row for each note, those that are `doubts` first and so called. More than `most` are counted;
+/// doubts never are.
+void add_notes(Table& table, const std::vector<std::string>& notes,
+               const std::vector<std::string>& doubts,
+               std::size_t most = std::numeric_limits<std::size_t>::max());
 
 }  // namespace cairn::app

@@ -91,7 +91,8 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
     const OtherMinima found =
         search_other_minima(graph, starts, *candidates_.optimizer,
                             [&](double part) { return wanted("other starts", part); });
-    return {.lower = !found.found_by.empty(), .notes = in_words(found, reason)};
+    return {
+        .lower = !found.found_by.empty(), .notes = in_words(found, reason), .doubt = doubt(found)};
   }
 
  private:
@@ -249,13 +250,15 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
           fmt::format("looked for other minima, {}: {} leads to chi2 {:.6g} instead of {:.6g}",
                       reason, found.found_by, found.chi2, found.before));
     }
-    if (found.until_the_end) {
-      notes.push_back(
-          fmt::format("{} of {} starts ended in other minima, and lower ones were found until the "
-                      "end: there may be a lower one than chi2 {:.6g}",
-                      found.elsewhere, found.starts, found.chi2));
-    }
     return notes;
+  }
+
+  static std::string doubt(const OtherMinima& found) {
+    if (!found.until_the_end) return {};
+    return fmt::format(
+        "{} of {} starts ended in other minima, and lower ones were found until the end: there may "
+        "be a lower one than chi2 {:.6g}",
+        found.elsewhere, found.starts, found.chi2);
   }
 
   /// Whether to go on; once it is not, it never is.

@@ -150,6 +150,7 @@ static void names_what_is_wrong(cairn_registry* registry) {
   fails(cairn_graph_optimize(graph, "dogleg:initial_radius=-1", NULL, NULL, NULL), CAIRN_USAGE, "initial_radius");
   EXPECT(cairn_graph_variable_count(graph) == 2 && cairn_graph_factor_count(graph) == 2);
   EXPECT(cairn_graph_variable_count(NULL) == 0 && strcmp(cairn_graph_notes(NULL), "") == 0);
+  EXPECT(strcmp(cairn_graph_doubts(NULL), "") == 0 && strcmp(cairn_estimator_doubts(NULL), "") == 0);
   EXPECT(strcmp(cairn_status_name(17), "") == 0);
   cairn_graph_free(graph);
   cairn_graph_free(NULL);

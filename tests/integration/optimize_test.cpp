@@ -6,12 +6,15 @@
 #include <string>
 #include <utility>
 
+#include <boost/json/serialize.hpp>
+
 #include "cairn/plugin/registry.hpp"
 #include "integration/process.hpp"
 
 namespace cairn::test {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -187,6 +190,21 @@ TEST_F(OptimizeCommand, SaysHowManyLoopClosuresALossRejectsAndThatNoFileHasIt) {
   EXPECT_THAT(notes, HasSubstr("loop closures less than 1 % of their weight"));
   EXPECT_THAT(notes, HasSubstr("are not in the file: no format has them"));
   EXPECT_THAT(notes, Not(HasSubstr("hardly")));
+  EXPECT_TRUE(report.at("doubts").as_array().empty()) << boost::json::serialize(report);
+}
+
+TEST_F(OptimizeCommand, WhatSpeaksAgainstTheEstimateIsTheDoubtsOfTheReport) {
+  const std::string file = folder_.file("contradiction.g2o");
+  write_text(file,
+             "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nEDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n"
+             "EDGE_SE2 0 1 90 0 0 1 0 0 1 0 1\n");
+  const auto report = report_of({"optimize", file});
+  ASSERT_EQ(report.at("doubts").as_array().size(), 1U) << boost::json::serialize(report);
+  const std::string doubt(report.at("doubts").at(0).as_string());
+  EXPECT_THAT(doubt, HasSubstr("hardly the right one"));
+  EXPECT_THAT(boost::json::serialize(report.at("notes")), HasSubstr("anchored"));
+  EXPECT_THAT(unfolded(cairn({"optimize", file, "--quiet"}).out),
+              AllOf(HasSubstr("doubt chi2 is "), HasSubstr("note ")));
 }
 
 TEST_F(OptimizeCommand, AnOptimizerThatTakesNoLinearSolverSaysWhatToUseInstead) {

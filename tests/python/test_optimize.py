@@ -43,6 +43,19 @@ def test_a_summary_says_that_its_limit_ended_it():
     assert not any("stopped by" in note for note in summary.notes)
 
 
+def test_what_speaks_against_an_estimate_is_told_from_what_informs():
+    graph = from_dense(disturbed())
+    graph.fix(graph.fixed, False)
+    summary = cairn.optimize(graph, initial=None)
+    assert summary.converged and summary.doubts == [] and any("anchored" in note for note in summary.notes)
+    graph.add(cairn.Between(3, 9, cairn.Pose2(9, 9, 0)), sigmas=0.02)
+    summary = cairn.optimize(graph, initial=None)
+    assert summary.converged and len(summary.doubts) == 1 and "hardly the right one" in summary.doubts[0]
+    assert set(summary.doubts) < set(summary.notes)
+    summary = cairn.optimize(from_dense(disturbed()), initial=None, max_iterations=1)
+    assert "stopped by max_iterations 1 before it converged" in summary.doubts
+
+
 def test_states_that_are_too_large_end_no_process():
     if "ceres_line_search" not in cairn.components("optimizer"):
         pytest.skip("there is no optimizer ceres_line_search")

@@ -9,7 +9,7 @@ import pytest
 sys.path.insert(0, os.path.dirname(__file__))
 
 import search
-from trial import doubts_of, judge
+from trial import judge
 from worlds import KINDS, draw, is_odometry, stays_connected
 
 
@@ -41,11 +41,6 @@ def test_a_bad_start_is_found():
     assert silent
     assert all(v.chi2 > v.best for v in silent)
     assert "silent" in search.shown(silent[0]) and "--kind rotation" in search.shown(silent[0])
-
-
-def test_notes_that_inform_are_no_doubts():
-    doubts = ["chi2 is 80 times the degrees of freedom", "initial guess auto: 5 of 9 starts ended elsewhere: there may be a lower one than chi2 3"]
-    assert doubts_of(["pose 0 is anchored", "initial guess auto: chordal", *doubts]) == doubts
 
 
 def test_a_table_counts_every_kind(capsys):

@@ -2,7 +2,6 @@
 """What default settings make of a world, beside the best that is known of it."""
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field
 from typing import List, Optional, Tuple
 
@@ -19,10 +18,6 @@ ROUNDING = 1e-9
 IMPLAUSIBLE = 25.0
 STARTS: List[Optional[str]] = [None, "odometry", "spanning_tree", "chordal", "incremental", "auto"]
 OPTIMIZERS = ["levenberg_marquardt", "dogleg"]
-"""Notes that begin or go on like this inform: all others are doubts."""
-INFORMS = re.compile(
-    r"initial guess \S+: (?!.*there may be a lower one)|.*anchored|.*gauge of a component is left free|.*(is|are) free|.*can (shift|turn|move)|without damping H is|"
-    r"the loss leaves [^:]*$|converged at chi2 .* kept a better estimate")
 
 
 @dataclass
@@ -48,10 +43,6 @@ FINDINGS = {
     "not converged": "code 4",
     "error": "an exception, or the end of the process",
 }
-
-
-def doubts_of(notes: List[str]) -> List[str]:
-    return [note for note in notes if not INFORMS.match(note)]
 
 
 def solve(world: World, states: cairn.Graph, optimizer: str, initial: Optional[str]) -> Tuple[float, cairn.Summary, cairn.Graph]:
@@ -104,7 +95,7 @@ def judge(kind: str, seed: int, world: World, initial: Optional[str] = "auto", a
     verdict = Verdict(kind, seed, name=world.name + (f"; --loss {world.loss} --loss-on {world.loss_on}" if world.loss else ""))
     verdict.chi2, summary, estimate = solve(world, world.graph, OPTIMIZERS[0], initial)
     verdict.notes = list(summary.notes)
-    verdict.doubts = doubts_of(verdict.notes)
+    verdict.doubts = list(summary.doubts)
     if alone:
         truth = with_states(world.graph, world.truth)
         truth.set_loss(world.loss, world.loss_on)

@@ -81,6 +81,8 @@ CAIRN_C_API cairn_code cairn_graph_clone(cairn_graph* graph, cairn_graph** copy)
 CAIRN_C_API void cairn_graph_free(cairn_graph* graph);
 /* What is worth knowing of the last reading or optimisation, one sentence per line; "" if nothing is. */
 CAIRN_C_API const char* cairn_graph_notes(const cairn_graph* graph);
+/* Those notes of the last optimisation that give reason to doubt the estimate, one per line; "" if none does. */
+CAIRN_C_API const char* cairn_graph_doubts(const cairn_graph* graph);
 
 /* Adds a variable by the tag of its type ("VERTEX_SE2": x, y, theta). `id`: from 0. `fixed`: it is not estimated. */
 CAIRN_C_API cairn_code cairn_graph_add_variable(cairn_graph* graph, const char* tag, int64_t id, const double* state,
@@ -225,6 +227,8 @@ CAIRN_C_API cairn_code cairn_estimator_update(cairn_estimator* estimator, const 
                                               cairn_report* report);
 /* Notes on the last update, one sentence per line. */
 CAIRN_C_API const char* cairn_estimator_notes(const cairn_estimator* estimator);
+/* What gives reason to doubt the estimate since the last update, one sentence per line; "" if nothing does. */
+CAIRN_C_API const char* cairn_estimator_doubts(const cairn_estimator* estimator);
 
 CAIRN_C_API size_t cairn_estimator_variable_count(const cairn_estimator* estimator);
 CAIRN_C_API size_t cairn_estimator_factor_count(const cairn_estimator* estimator);

@@ -20,6 +20,7 @@ struct cairn_estimator {
   std::unique_ptr<cairn::Estimator> estimator;
   cairn::GraphUpdate collected = {};  ///< for the next update
   std::string notes = {};
+  std::string doubts = {};
 };
 
 using namespace cairn::c;
@@ -102,11 +103,9 @@ cairn_code cairn_estimator_update(cairn_estimator* estimator, const cairn_update
     cairn::UpdateOptions how;
     if (options) how = {options->defer != 0, options->full != 0, options->max_seconds};
     cairn::UpdateReport did = call(of, [&] { return of.estimator->update(update, how); });
-    if (how.full) {
-      std::string note = cairn::in_words(cairn::rejected_factors(of.estimator->graph()));
-      if (!note.empty()) did.notes.push_back(std::move(note));
-    }
+    if (how.full) cairn::note_rejected(of.estimator->graph(), did);
     of.notes = joined(did.notes);
+    of.doubts = joined(did.doubts);
     if (!report) return;
     *report = {did.ok ? 1 : 0, did.converged ? 1 : 0, did.first_factor, did.iterations,
                did.owed,       did.seconds.total};
@@ -115,6 +114,10 @@ cairn_code cairn_estimator_update(cairn_estimator* estimator, const cairn_update
 
 const char* cairn_estimator_notes(const cairn_estimator* estimator) {
   return estimator ? estimator->notes.c_str() : "";
+}
+
+const char* cairn_estimator_doubts(const cairn_estimator* estimator) {
+  return estimator ? estimator->doubts.c_str() : "";
 }
 
 size_t cairn_estimator_variable_count(const cairn_estimator* estimator) {

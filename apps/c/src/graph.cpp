@@ -125,7 +125,7 @@ cairn_code cairn_graph_clone(cairn_graph* graph, cairn_graph** copy) {
     given(copy, "copy");
     const cairn_graph& from = given(graph, "graph");
     hand_out(copy, std::make_unique<cairn_graph>(
-                       cairn_graph{from.registry, from.graph.clone(), from.notes}));
+                       cairn_graph{from.registry, from.graph.clone(), from.notes, from.doubts}));
   });
 }
 
@@ -133,6 +133,10 @@ void cairn_graph_free(cairn_graph* graph) { delete graph; }
 
 const char* cairn_graph_notes(const cairn_graph* graph) {
   return graph ? graph->notes.c_str() : "";
+}
+
+const char* cairn_graph_doubts(const cairn_graph* graph) {
+  return graph ? graph->doubts.c_str() : "";
 }
 
 cairn_code cairn_graph_add_variable(cairn_graph* graph, const char* tag, int64_t id,

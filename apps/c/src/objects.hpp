@@ -23,7 +23,8 @@ struct cairn_graph {
   std::shared_ptr<cairn::Registry> registry;
   cairn::Graph graph;
   std::string notes = {};
-  std::string text = {};  ///< handed out last
+  std::string doubts = {};  ///< those of the notes of the last optimisation
+  std::string text = {};    ///< handed out last
 };
 
 namespace cairn::c {

@@ -106,6 +106,7 @@ cairn_code cairn_graph_optimize(cairn_graph* graph, const char* optimizer, const
         optimize(of.graph, *of.registry, name_or(optimizer, kOptimizer),
                  name_or(initial, kInitialGuess), stop ? *stop : defaults);
     of.notes = joined(result.notes);
+    of.doubts = joined(result.doubts);
     if (!summary) return;
     *summary = {static_cast<cairn_status>(result.status),
                 static_cast<int>(result.iterations.size()), result.initial_chi2, result.final_chi2,

@@ -104,7 +104,7 @@ void run(Plan& plan, const PolicySetting& setting, Follower& follower, BoundResu
     for (const auto& advice : check.advice(found, setting.data.loops))
       out.notes.push_back(to_string(advice));
   }
-  for (std::string& doubt : notes_on_estimate(out.result.compact, chi2(out.result.compact)))
+  for (std::string& doubt : notes_on_estimate(out.result.compact, chi2(out.result.compact)).notes)
     out.notes.push_back(std::move(doubt));
 }
 

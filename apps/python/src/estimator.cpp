@@ -104,12 +104,6 @@ void change(BoundEstimator& bound, FactorId factor, const py::object& values,
   bound.pending().changed.push_back(std::move(changed));
 }
 
-/// A note on what robust losses have rejected of the whole estimate.
-void add_rejected(Estimator& estimator, UpdateReport& report) {
-  std::string note = in_words(rejected_factors(estimator.graph()));
-  if (!note.empty()) report.notes.push_back(std::move(note));
-}
-
 UpdateReport update(BoundEstimator& bound, bool full, bool defer, double max_seconds) {
   if (!(max_seconds >= 0.0))
     throw Error(ErrorCode::usage, "max_seconds: expected 0 (no limit) or more");
@@ -119,7 +113,7 @@ UpdateReport update(BoundEstimator& bound, bool full, bool defer, double max_sec
   Estimator& estimator = use.estimator();
   UpdateReport report =
       estimator.update(what, {.defer = defer, .full = full, .max_seconds = max_seconds});
-  if (full) add_rejected(estimator, report);
+  if (full) note_rejected(estimator.graph(), report);
   return report;
 }
 
@@ -167,6 +161,8 @@ void bind_report(py::module_& module) {
                              "Of each part: linearize, order, factorize, solve, check, marginals; "
                              "total.")
       .def_readonly("notes", &UpdateReport::notes, "Sentences for the user.")
+      .def_readonly("doubts", &UpdateReport::doubts,
+                    "What gives reason to doubt the estimate, after every update while it lasts.")
       .def("__repr__", [](const UpdateReport& report) {
         return fmt::format("<cairn.UpdateReport {}: {} affected, {} relinearized, {:.3g} s>",
                            report.ok ? "ok" : "not ok", report.affected_variables,

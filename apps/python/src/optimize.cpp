@@ -185,6 +185,8 @@ void bind_summary(py::module_& module) {
       .def_property_readonly("seconds", &seconds_of,
                              "Of each part: linearize, analyze, factorize, solve, update; total.")
       .def_readonly("notes", &Summary::notes, "Sentences for the user, such as what was anchored.")
+      .def_readonly("doubts", &Summary::doubts,
+                    "Those of the notes that give reason to doubt the estimate.")
       .def("__repr__",
            [](const Summary& summary) {
              const std::string text = to_string(summary);

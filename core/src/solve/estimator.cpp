@@ -1,9 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/solve/estimator.hpp"
 
+#include <utility>
+
 namespace cairn {
 
 Estimator::~Estimator() = default;
+
+void UpdateReport::doubt(std::string sentence) {
+  doubts.push_back(sentence);
+  notes.push_back(std::move(sentence));
+}
 
 UpdateSeconds& UpdateSeconds::operator+=(const UpdateSeconds& other) {
   total += other.total;

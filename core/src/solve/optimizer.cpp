@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/solve/optimizer.hpp"
 
+#include <utility>
+
 #include <fmt/core.h>
 
 #include "cairn/runtime/error.hpp"
@@ -36,6 +38,11 @@ void check(const Stop& stop) {
   if (!(stop.tolerance >= 0.0 && stop.tolerance <= 1.0))
     refuse("tolerance", stop.tolerance, "a fraction from 0 to 1");
   if (!(stop.max_seconds >= 0.0)) refuse("max_seconds", stop.max_seconds, "0 (no limit) or more");
+}
+
+void Summary::doubt(std::string sentence) {
+  doubts.push_back(sentence);
+  notes.push_back(std::move(sentence));
 }
 
 Observer::~Observer() = default;

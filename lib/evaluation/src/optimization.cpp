@@ -49,6 +49,10 @@ void add(const Seconds& more, Seconds& seconds) {
   seconds.update += more.update;
 }
 
+void append(std::vector<std::string> more, std::vector<std::string>& sentences) {
+  std::ranges::move(more, std::back_inserter(sentences));
+}
+
 /// Goes on from the graph's states, to the end of what `summary` begins.
 void go_on_from(Graph& graph, const Optimization& of, const Stop& stop, Observer& observer,
                 Summary& summary) {
@@ -64,6 +68,7 @@ void go_on_from(Graph& graph, const Optimization& of, const Stop& stop, Observer
     if (std::ranges::find(summary.notes, note) == summary.notes.end())
       summary.notes.push_back(std::move(note));
   }
+  summary.doubts = std::move(more.doubts);  // those before were of an estimate that is left
   add(more.seconds, summary.seconds);
   summary.status = more.status;
   summary.final_chi2 = more.final_chi2;
@@ -96,6 +101,8 @@ void look_again(Graph& graph, const Optimization& of, const Stop& stop, Observer
     summary.notes.push_back(fmt::format("initial guess {}: {}", of.guess_name, note));
   if (found.lower && summary.status == Status::converged)
     go_on_from(graph, of, stop, observer, summary);
+  if (!found.doubt.empty())
+    summary.doubt(fmt::format("initial guess {}: {}", of.guess_name, found.doubt));
   if (found.lower && summary.status == Status::interrupted) summary.final_chi2 = chi2(graph);
 }
 
@@ -109,8 +116,7 @@ Summary optimize(Graph& graph, const Optimization& of, const Stop& stop, Observe
   Summary summary = call_plugin([&] { return fmt::format("optimizer '{}'", of.optimizer_name); },
                                 [&] { return of.optimizer.optimize(graph, stop, observer); });
   look_again(graph, of, stop, observer, std::move(go_on), summary);
-  for (std::string& note : notes_on_the_end(summary, stop, graph))
-    summary.notes.push_back(std::move(note));
+  note_the_end(summary, stop, graph);
   summary.notes.insert(summary.notes.begin(), notes.begin(), notes.end());
   return summary;
 }
@@ -120,22 +126,19 @@ bool is_estimate(const Summary& summary, const Stop& stop) {
          (summary.status == Status::max_iterations && !(stop.tolerance > 0.0));
 }
 
-std::vector<std::string> notes_on_the_end(const Summary& summary, const Stop& stop,
-                                          const Graph& graph, std::string_view max_iterations) {
-  std::vector<std::string> notes;
-  if (summary.status == Status::interrupted) return notes;
+void note_the_end(Summary& summary, const Stop& stop, const Graph& graph,
+                  std::string_view max_iterations) {
+  if (summary.status == Status::interrupted) return;
   if (summary.status == Status::max_iterations && !is_estimate(summary, stop) &&
       std::ssize(summary.iterations) >= stop.max_iterations) {
-    notes.push_back(
+    summary.doubt(
         fmt::format("stopped by {} {} before it converged", max_iterations, stop.max_iterations));
   }
-  for (std::string& note : notes_on_estimate(graph, summary.final_chi2))
-    notes.push_back(std::move(note));
-  if (!losses_weigh_nothing(graph).empty()) return notes;  // everything is free
-  std::vector<std::string> with_free = summary.notes;      // the optimizer may have said it
-  note_what_is_free(graph, with_free);
-  if (with_free.size() > summary.notes.size()) notes.push_back(std::move(with_free.back()));
-  return notes;
+  NotesOnEstimate of_estimate = notes_on_estimate(graph, summary.final_chi2);
+  append(std::move(of_estimate.notes), summary.notes);
+  append(std::move(of_estimate.doubts), summary.doubts);
+  if (losses_weigh_nothing(graph).empty())    // else everything is free
+    note_what_is_free(graph, summary.notes);  // the optimizer may have said it
 }
 
 }  // namespace cairn

@@ -181,11 +181,13 @@ std::string rejection(const Graph& graph, bool nearly_all) {
 
 }  // namespace
 
-std::vector<std::string> notes_on_estimate(const Graph& graph, double chi2) {
-  std::vector<std::string> sentences = reasons_for_doubt(graph, chi2);
+NotesOnEstimate notes_on_estimate(const Graph& graph, double chi2) {
+  NotesOnEstimate said;
+  said.doubts = reasons_for_doubt(graph, chi2);
+  said.notes = said.doubts;
   if (std::string sentence = rejection(graph, false); !sentence.empty())
-    sentences.push_back(std::move(sentence));
-  return sentences;
+    said.notes.push_back(std::move(sentence));
+  return said;
 }
 
 std::vector<std::string> reasons_for_doubt(const Graph& graph, double chi2) {

@@ -28,7 +28,7 @@ double optimize_whole(Graph& graph, Optimizer& optimizer, const std::string& nam
                                        what, to_string(summary.status)));
   }
   if (!result.interrupted) {
-    for (const std::string& doubt : notes_on_estimate(graph, summary.final_chi2))
+    for (const std::string& doubt : notes_on_estimate(graph, summary.final_chi2).notes)
       result.notes.push_back(fmt::format("{}: {}", what, doubt));
   }
   return summary.final_chi2;

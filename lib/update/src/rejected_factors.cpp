@@ -2,6 +2,7 @@
 #include "cairn/update/rejected_factors.hpp"
 
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <fmt/core.h>
@@ -51,6 +52,16 @@ std::string in_words(const RejectedFactors& of) {
          ": the estimate is nearly that without loop closures, which is hardly the right one if "
          "most "
          "of them are right; a larger scale of the loss, or one that grows (cauchy), uses them";
+}
+
+void note_rejected(const Graph& graph, UpdateReport& report) {
+  const RejectedFactors rejected = rejected_factors(graph);
+  std::string sentence = in_words(rejected);
+  if (rejected.nearly_all_loops()) {
+    report.doubt(std::move(sentence));
+  } else if (!sentence.empty()) {
+    report.notes.push_back(std::move(sentence));
+  }
 }
 
 }  // namespace cairn

@@ -171,8 +171,9 @@ void BatchEstimator::batch_step(const UpdateOptions& options, UpdateReport& repo
   tools_->user = nullptr;
   const Summary summary = tools_->optimizer->optimize(graph_, stop);
   for (const std::string& sentence : summary.notes) note(sentence, report);
+  report.doubts = summary.doubts;
   const std::string why = report_batch_step(summary, stop_, options, graph_.factor_count(), report);
-  if (!why.empty()) note(why, report, options.full);
+  if (!why.empty()) doubt(why, report, options.full);
   report_free(find_free_directions(graph_), report);
   report.affected_variables = report.iterations * graph_.variable_count();
   if (report.iterations > 0)
@@ -203,14 +204,14 @@ void BatchEstimator::linear_step(UpdateReport& report) {
     equations.solve(step);
     report.iterations = 1;
     report.converged = is_finite(step);
-    if (!report.converged) return note(kStepNotFinite, report);
+    if (!report.converged) return doubt(kStepNotFinite, report);
     Values values;
     equations.retract(linearized_at_, step, values);
     graph_.set_values(std::move(values));
     report.affected_variables = graph_.variable_count();
     unsolved_factors_ = 0;
   } else if (!factorization.ok) {
-    note(equations.explain(factorization), report);
+    doubt(equations.explain(factorization), report);
   }
   add_seconds(equations.seconds(), report.seconds);
   memory_ = std::max(memory_, 8 * tools_->solver->stats().factor_nonzeros);
@@ -229,6 +230,11 @@ void BatchEstimator::extend_linearization_points() {
 
 void BatchEstimator::note(const std::string& sentence, UpdateReport& report, bool again) {
   if (told_.insert(sentence).second || again) report.notes.push_back(sentence);
+}
+
+void BatchEstimator::doubt(const std::string& sentence, UpdateReport& report, bool again) {
+  report.doubts.push_back(sentence);
+  note(sentence, report, again);
 }
 
 /// An update after which something is free is not ok, and every one says what.

@@ -107,6 +107,8 @@ class BatchEstimator final : public Estimator {
   void extend_linearization_points();
   /// Once, or `again` each time.
   void note(const std::string& sentence, UpdateReport& report, bool again = false);
+  /// That, and a doubt at every update.
+  void doubt(const std::string& sentence, UpdateReport& report, bool again = false);
   void report_free(const FreeDirections& free, UpdateReport& report);
   void compute_kept(UpdateReport& report);
   int index(Id id) const;

@@ -82,8 +82,8 @@ void Engine::optimize(Graph& graph, double tolerance, UpdateReport& report) {
   report.iterations += static_cast<int>(summary.iterations.size());
   report.converged = summary.status == Status::converged;
   if (!report.converged)
-    report.notes.push_back(fmt::format("not converged: {} after {} iterations",
-                                       to_string(summary.status), summary.iterations.size()));
+    report.doubt(fmt::format("not converged: {} after {} iterations", to_string(summary.status),
+                             summary.iterations.size()));
 }
 
 void Engine::keep_answers(Answers* answers) {

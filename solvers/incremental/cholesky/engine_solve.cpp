@@ -288,7 +288,7 @@ void Engine::factorized(UpdateReport& report) {
       broken_ = undetermined_;
       if (job_.converged) break;
       report.converged = false;
-      report.notes.push_back(fmt::format("not converged after {} iterations", job_.rounds));
+      report.doubt(fmt::format("not converged after {} iterations", job_.rounds));
       return end_job();
   }
   job_.go_to(Job::Stage::right_hand_side);

@@ -324,6 +324,7 @@ double IncrementalCholesky::end_solution(bool full, UpdateReport& report) {
     report.converged = true;
     report.owed = 0;
     report.notes.clear();
+    report.doubts.clear();
   }
   return seconds_since(begin);
 }

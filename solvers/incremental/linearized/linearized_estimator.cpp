@@ -471,9 +471,10 @@ void LinearizedEstimator::batch_step(const UpdateOptions& options, UpdateReport&
     summary = batch_->optimizer->optimize(state_.graph, stop);
   }
   for (const std::string& sentence : summary.notes) note(sentence, report);
+  report.doubts = summary.doubts;
   const std::string why =
       report_batch_step(summary, batch_->stop, options, state_.graph.factor_count(), report);
-  if (!why.empty()) note(why, report, options.full);
+  if (!why.empty()) doubt(why, report, options.full);
   report.affected_variables = report.iterations * state_.graph.variable_count();
   report.relinearized_factors = state_.graph.factor_count();
   report.seconds.linearize += summary.seconds.linearize + summary.seconds.update;
@@ -502,7 +503,7 @@ void LinearizedEstimator::check_converged(UpdateReport& report) {
   }
   report.converged = decrease <= kTolerance * chi2 || norm <= kRounding * std::sqrt(squares);
   if (!report.converged) {
-    report.notes.push_back(
+    report.doubt(
         fmt::format("not converged: a filter linearises each factor once; a step from here would "
                     "lower chi2 by about {:.3g} of {:.6g}",
                     decrease, chi2));
@@ -540,6 +541,11 @@ LinearizedEstimator::Step LinearizedEstimator::newton_step() {
 
 void LinearizedEstimator::note(const std::string& sentence, UpdateReport& report, bool again) {
   if (reported_.insert(sentence).second || again) report.notes.push_back(sentence);
+}
+
+void LinearizedEstimator::doubt(const std::string& sentence, UpdateReport& report, bool again) {
+  report.doubts.push_back(sentence);
+  note(sentence, report, again);
 }
 
 void LinearizedEstimator::set_loss(std::shared_ptr<const Loss> loss, const FactorSelector& which) {

@@ -121,6 +121,8 @@ class LinearizedEstimator final : public Estimator {
   Step newton_step();
   /// Once, or `again` each time.
   void note(const std::string& sentence, UpdateReport& report, bool again = false);
+  /// That, and a doubt at every update.
+  void doubt(const std::string& sentence, UpdateReport& report, bool again = false);
   int index(Id id) const;
 
   std::unique_ptr<GaussianForm> form_;

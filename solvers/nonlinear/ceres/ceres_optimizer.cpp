@@ -212,7 +212,7 @@ Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& obser
         find_free_directions(graph, gauge, graph.values()).empty() &&
         left.norm > kCeresRounding * state_extent(graph, gauge, graph.values())) {
       summary.status = Status::diverged;
-      summary.notes.push_back(
+      summary.doubt(
           fmt::format("Ceres took a short step for convergence, but the model predicts a decrease "
                       "of {:.3g}",
                       left.decrease));

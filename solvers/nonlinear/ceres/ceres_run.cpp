@@ -42,7 +42,7 @@ bool ends_at_once(const Graph& graph, const Gauge& gauge, const Stop& stop, Obse
   // Ceres ends the process for numbers that it does not expect.
   const bool finite = std::isfinite(summary.initial_chi2);
   if (!idle && stop.max_iterations > 0 && finite) return false;
-  if (!finite) summary.notes.emplace_back("chi2 of the initial estimate is not finite");
+  if (!finite) summary.doubt("chi2 of the initial estimate is not finite");
   summary.status = !finite ? Status::diverged : idle ? Status::converged : Status::max_iterations;
   observer.on_start(graph, summary.initial_chi2);
   return true;

@@ -182,7 +182,7 @@ bool Run::converged() {
 Status Run::without_descent() {
   const NewtonStep step = decrement_.at(values_);
   if (std::isfinite(chi2_) && std::isnan(step.decrease)) {
-    summary_.notes.emplace_back(
+    summary_.doubt(
         "the line search has ended where H is not positive definite: factors that a robust loss "
         "weighs with zero hold nothing; begin nearer to the minimum, such as at that without loss");
     return Status::not_positive_definite;
@@ -190,7 +190,7 @@ Status Run::without_descent() {
   const bool rounding = step.decrease <= kCeresRounding * chi2_ ||
                         step.norm <= kCeresRounding * state_extent(graph_, gauge_, values_);
   if (std::isfinite(chi2_) && rounding) return Status::converged;
-  summary_.notes.push_back(
+  summary_.doubt(
       fmt::format("the line search finds no step that lowers chi2, though the model predicts a "
                   "decrease of {:.3g}",
                   step.decrease));

@@ -109,7 +109,7 @@ Descent::Descent(std::string optimizer, std::string linear_solver, LinearSolver&
   for (const std::string& sentence : summary_.notes) observer_.on_message(sentence);
   observer_.on_start(graph, summary_.initial_chi2);
   if (!std::isfinite(chi2)) {
-    note("chi2 of the initial estimate is not finite");
+    doubt("chi2 of the initial estimate is not finite");
     end(Status::diverged);
   }
 }
@@ -159,7 +159,7 @@ bool Descent::must_stop() {
   if (stop_.interrupt && stop_.interrupt->load(std::memory_order_relaxed)) {
     end(Status::interrupted);
   } else if (stop_.max_seconds > 0.0 && seconds_since(begin_) > stop_.max_seconds) {
-    note(fmt::format("stopped by the limit of {} s", stop_.max_seconds));
+    doubt(fmt::format("stopped by the limit of {} s", stop_.max_seconds));
     end(Status::max_iterations);
   }
   return ended();
@@ -213,7 +213,7 @@ bool Descent::is_solution(std::span<const double> out) {
 
 void Descent::note_wrong_step(const std::string& residual) {
   if (std::exchange(reported_wrong_step_, true)) return;
-  note(
+  doubt(
       fmt::format("linear solver {} returned in iteration {} what does not solve H x = g: "
                   "‖Hx − g‖ is {}",
                   summary_.linear_solver, number_, residual));
@@ -280,7 +280,7 @@ std::vector<double> Descent::min_diagonal(double fraction) const {
 }
 
 void Descent::end_not_finite() {
-  note(fmt::format("linear solver {} returned a step that is not finite", summary_.linear_solver));
+  doubt(fmt::format("linear solver {} returned a step that is not finite", summary_.linear_solver));
   end(Status::diverged);
 }
 
@@ -321,7 +321,7 @@ void Descent::end_converged(bool is_damped) {
     end(Status::converged);
     return;
   }
-  note(
+  doubt(
       fmt::format("the information of the factors differs by a factor of {:.1g}, and of the "
                   "smallest H has no digit left in double precision: that no step lowers chi2 is "
                   "no sign of a minimum; linear solver spqr works without H",
@@ -335,7 +335,7 @@ void Descent::end_without_descent(double promise, double step_norm, bool is_damp
     end_converged(is_damped);
     return;
   }
-  note(
+  doubt(
       fmt::format("no step lowers chi2, though the model predicts a decrease of {:.3g}: a Jacobian "
                   "does not fit its residual, or a residual is not continuous or not finite nearby",
                   promise));
@@ -343,7 +343,7 @@ void Descent::end_without_descent(double promise, double step_norm, bool is_damp
 }
 
 void Descent::end_not_positive_definite(const Factorization& failure) {
-  note(equations_->explain(failure));
+  doubt(equations_->explain(failure));
   end(Status::not_positive_definite);
 }
 
@@ -368,7 +368,7 @@ Summary Descent::finish() {
   if (summary_.status == Status::converged && equations_->size() > 0) {
     const double rounding = coordinate_rounding();
     if (rounding > std::max(kRounding * best_chi2_, kNoticeable)) {
-      note(
+      doubt(
           fmt::format("the coordinates are so large that their rounding alone makes chi2 uncertain "
                       "by {:.1g}: an origin nearer to the map keeps more digits",
                       rounding));
@@ -380,7 +380,7 @@ Summary Descent::finish() {
     if (!free_.everywhere)
       free_ = find_free_directions(graph_, equations_->gauge(), graph_.values());
     if (summary_.status == Status::converged && !free_.finite) {
-      note("the Jacobian of a factor is not finite at the estimate");
+      doubt("the Jacobian of a factor is not finite at the estimate");
       summary_.status = Status::diverged;
     }
     std::string sentence = free_.describe(graph_);

@@ -113,6 +113,8 @@ class Descent {
   void end(Status status) { status_ = status; }
   bool ended() const { return status_.has_value(); }
   void note(std::string sentence) { summary_.notes.push_back(std::move(sentence)); }
+  /// A note that is a reason to doubt the estimate (`Summary::doubts`).
+  void doubt(std::string sentence) { summary_.doubt(std::move(sentence)); }
   /// Ends the run for a factorisation of H that failed, with a note that gives the reason.
   void end_not_positive_definite(const Factorization& failure);
 

@@ -49,7 +49,7 @@ class Run {
     const DoglegPath::Step step = arrived ? path_.end(run_.step) : path_.at(radius, run_.step);
     double step_norm = norm(run_.step);
     if (!std::isfinite(step_norm)) {
-      run_.note("the step is not finite");
+      run_.doubt("the step is not finite");
       run_.end(Status::diverged);
       return;
     }

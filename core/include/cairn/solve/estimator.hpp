@@ -61,6 +61,12 @@ struct UpdateReport {
   UpdateSeconds seconds;
   /// Notes for the user, one sentence each, such as which variable was anchored.
   std::vector<std::string> notes;
+  /// What gives reason to doubt the estimate, as in `Summary`: after every update while it lasts,
+  /// though a note may be given once only.
+  std::vector<std::string> doubts;
+
+  /// Adds a note that is a reason for doubt.
+  CAIRN_API void doubt(std::string sentence);
 };
 
 /// Which covariances an estimator keeps up to date after every update.

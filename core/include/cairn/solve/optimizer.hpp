@@ -68,6 +68,13 @@ struct Summary {
   /// Notes for the user, one sentence each: the gauge, why a factorisation failed and at which
   /// variable, where it stopped.
   std::vector<std::string> notes;
+  /// Those of the notes that give reason to doubt the estimate: it has not converged, or may be
+  /// another minimum than the right one. What only informs, such as what was anchored or is free,
+  /// is not among them.
+  std::vector<std::string> doubts;
+
+  /// Adds a note that is a reason for doubt.
+  CAIRN_API void doubt(std::string sentence);
 };
 
 /// Minimises Σ ρ(‖r‖²) over a graph's variables, starting from its states and leaving the best

@@ -91,8 +91,10 @@ TEST_F(Optimizations, BeginWithTheGuessAndEndWithWhatSpeaksAgainstTheEstimate) {
   graph_.set_loss(std::make_shared<Weightless>());
   MovesTo near(0.1);
   Stays optimizer(Status::converged);
-  EXPECT_THAT(run(optimizer, &near).notes, ElementsAre("initial guess moves: moved", "stayed",
-                                                       HasSubstr("no factor any weight")));
+  const Summary summary = run(optimizer, &near);
+  EXPECT_THAT(summary.notes, ElementsAre("initial guess moves: moved", "stayed",
+                                         HasSubstr("no factor any weight")));
+  EXPECT_THAT(summary.doubts, ElementsAre(summary.notes.back())) << "what informs is no doubt";
 }
 
 TEST_F(Optimizations, DoNotDoubtWhatWasInterrupted) {
@@ -120,7 +122,12 @@ TEST_F(Optimizations, SayThatTheirLimitEndedThem) {
   Summary summary;
   summary.final_chi2 = test::chi2_of(graph_);
   summary.iterations.resize(3);
-  const auto notes = [&](const Stop& stop) { return notes_on_the_end(summary, stop, graph_); };
+  const auto notes = [&](const Stop& stop) {
+    Summary ended = summary;
+    note_the_end(ended, stop, graph_);
+    EXPECT_EQ(ended.doubts, ended.notes);
+    return ended.notes;
+  };
   EXPECT_THAT(notes({.max_iterations = 3}),
               testing::Contains("stopped by max_iterations 3 before it converged"));
   EXPECT_THAT(notes({.max_iterations = 3, .tolerance = 0.0}),

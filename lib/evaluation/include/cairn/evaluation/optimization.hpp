@@ -37,7 +37,7 @@ CAIRN_API void look_again(Graph& graph, const Optimization& of, const Stop& stop
 
 /// The initial guess, then the optimizer, then `look_again`. The summary's notes are those of the
 /// guess, each after "initial guess NAME: ", those of the optimizer, and those on the end
-/// (`notes_on_the_end`). `go_on`: as above; none: what `stop.interrupt` says. What a component
+/// (`note_the_end`). `go_on`: as above; none: what `stop.interrupt` says. What a component
 /// throws names it.
 CAIRN_API Summary optimize(Graph& graph, const Optimization& of, const Stop& stop,
                            Observer& observer, WatchedGuess::GoOn go_on = {});
@@ -47,11 +47,11 @@ CAIRN_API Summary optimize(Graph& graph, const Optimization& of, const Stop& sto
 /// whatever is computed from them has to say that they are none.
 CAIRN_API bool is_estimate(const Summary& summary, const Stop& stop);
 
-/// Sentences on how a run ended: that it stopped before it converged, by the limit
-/// `max_iterations` (which the program calls by the name of its option), and what speaks against
-/// the estimate (`reasons_for_doubt`). None for one that was interrupted.
-CAIRN_API std::vector<std::string> notes_on_the_end(
-    const Summary& summary, const Stop& stop, const Graph& graph,
-    std::string_view max_iterations = "max_iterations");
+/// Adds to a summary what is to be said at the end of a run: that it stopped before it converged,
+/// by the limit `max_iterations` (which the program calls by the name of its option), and what
+/// speaks against the estimate (`reasons_for_doubt`), both as doubts; and what is free. Adds
+/// nothing to one that was interrupted.
+CAIRN_API void note_the_end(Summary& summary, const Stop& stop, const Graph& graph,
+                            std::string_view max_iterations = "max_iterations");
 
 }  // namespace cairn

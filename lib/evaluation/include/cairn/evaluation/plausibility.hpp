@@ -54,9 +54,13 @@ CAIRN_API std::string losses_weigh_nothing(const Graph& graph);
 /// (`rejected_factors`), `outside_of_domains` and `wrong_jacobians`. Empty if nothing does.
 CAIRN_API std::vector<std::string> reasons_for_doubt(const Graph& graph, double chi2);
 
-/// What a user is to be given with an estimate: the reasons for doubt, or, where losses reject
-/// fewer factors, how many they are ("the loss leaves 3 of 120 loop closures less than 1 % of their
-/// weight").
-CAIRN_API std::vector<std::string> notes_on_estimate(const Graph& graph, double chi2);
+/// What a user is to be given with an estimate.
+struct NotesOnEstimate {
+  /// The doubts, or, where losses reject fewer factors, how many they are ("the loss leaves 3 of
+  /// 120 loop closures less than 1 % of their weight").
+  std::vector<std::string> notes;
+  std::vector<std::string> doubts;  ///< `reasons_for_doubt`
+};
+CAIRN_API NotesOnEstimate notes_on_estimate(const Graph& graph, double chi2);
 
 }  // namespace cairn

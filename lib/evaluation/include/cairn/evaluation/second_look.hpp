@@ -19,7 +19,8 @@ class CAIRN_API SecondLook {
 
   struct Result {
     bool lower = false;              ///< the graph has states from which a lower minimum is reached
-    std::vector<std::string> notes;  ///< for the user: what was found, and what is in doubt
+    std::vector<std::string> notes;  ///< for the user: what was found
+    std::string doubt;  ///< why a lower minimum is likely all the same; empty: it is not
   };
 
   /// `graph` is where an optimisation has converged from the states that `compute` had left;

@@ -6,6 +6,7 @@
 
 #include "cairn/graph/graph.hpp"
 #include "cairn/runtime/api.hpp"
+#include "cairn/solve/estimator.hpp"
 
 namespace cairn {
 
@@ -23,5 +24,8 @@ CAIRN_API RejectedFactors rejected_factors(const Graph& graph);
 /// "the loss leaves 3 of 120 loop closures less than 1 % of their weight", with what that means
 /// where they are nearly all; empty where no factor is rejected.
 CAIRN_API std::string in_words(const RejectedFactors& rejected);
+
+/// Adds that sentence to what an update reports: as a doubt where they are nearly all.
+CAIRN_API void note_rejected(const Graph& graph, UpdateReport& report);
 
 }  // namespace cairn
