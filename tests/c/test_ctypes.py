@@ -44,6 +44,8 @@ lib = c.CDLL(os.environ["CAIRN_C_LIBRARY"])
 lib.cairn_error.restype = c.c_char_p
 lib.cairn_graph_notes.restype = c.c_char_p
 lib.cairn_graph_notes.argtypes = [c.c_void_p]
+lib.cairn_graph_doubts.restype = c.c_char_p
+lib.cairn_graph_doubts.argtypes = [c.c_void_p]
 
 
 def call(name, *arguments):
@@ -181,6 +183,31 @@ def test_an_initial_guess_is_stopped_too(graph):
     assert numbers == [0]
     assert summary.status == INTERRUPTED and summary.iterations == 0
     assert b"initial guess incremental: " in lib.cairn_graph_notes(graph)
+
+
+def test_a_message_advises_nothing_that_c_lacks(registry, tmp_path):
+    file = tmp_path / "other.g2o"
+    handle = c.c_void_p()
+    for content, option in [("VERTEX_SE2 0 0 0 0\nTHING 1\n", "--skip-unknown"),
+                            ("VERTEX_SE2 0 0 0 0\nEDGE_SE2 0 7 1 0 0 1 0 0 1 0 1\n", "--skip-dangling"),
+                            ("VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nEDGE_SE2 0 1 1 0 0\n", "--unit-information")]:
+        file.write_text(content)
+        assert lib.cairn_graph_read(registry, str(file).encode(), None, c.byref(handle)) == 3
+        message = lib.cairn_error().decode()
+        assert f"cairn convert {option}" in message and "::" not in message
+
+
+def test_what_speaks_against_an_estimate_is_told_from_its_notes(registry, tmp_path):
+    file = tmp_path / "contradiction.g2o"
+    file.write_text("VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nEDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\nEDGE_SE2 0 1 90 0 0 1 0 0 1 0 1\n")
+    graph = c.c_void_p()
+    call("cairn_graph_read", registry, str(file).encode(), None, c.byref(graph))
+    assert lib.cairn_graph_doubts(graph) == b""
+    call("cairn_graph_optimize", graph, None, None, None, None)
+    doubts = lib.cairn_graph_doubts(graph).splitlines()
+    assert len(doubts) == 1 and b"hardly the right one" in doubts[0]
+    assert doubts[0] in lib.cairn_graph_notes(graph).splitlines() and b"anchored" in lib.cairn_graph_notes(graph)
+    lib.cairn_graph_free(graph)
 
 
 def test_an_error_is_a_code_with_its_reason(registry):

@@ -3,7 +3,10 @@
 
 #include <exception>
 #include <new>
+#include <string>
+#include <string_view>
 #include <system_error>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -22,9 +25,22 @@ constexpr const char* kOutOfMemory = "out of memory";
 thread_local std::string message;
 thread_local const char* text = "";  // of `message`, or where there was no memory for that
 
+/// Options of reading, which C does not have, as those of the program, which can convert the file.
+std::string in_words_of_c(std::string words) {
+  for (const auto& [member, option] :
+       {std::pair("ReadOptions::skip_unknown", "cairn convert --skip-unknown"),
+        std::pair("ReadOptions::repair_information", "cairn convert --repair-information"),
+        std::pair("ReadOptions::unit_information", "cairn convert --unit-information"),
+        std::pair("ReadOptions::skip_dangling", "cairn convert --skip-dangling")}) {
+    if (const std::size_t at = words.find(member); at != std::string::npos)
+      words.replace(at, std::string_view(member).size(), option);
+  }
+  return words;
+}
+
 cairn_code failed(cairn_code code, const char* what) noexcept {
   try {
-    message = what;
+    message = in_words_of_c(what);
     text = message.c_str();
   } catch (...) {
     text = kOutOfMemory;
