@@ -2,6 +2,7 @@
 #include "cairn/typed/batched_factor.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <utility>
@@ -36,28 +37,53 @@ void whiten(const double* U, int n, int columns, const double* in, double* out) 
 
 }  // namespace
 
-/// All factors of a pool, evaluated.
+/// The factors of a pool from `first` on, evaluated.
 struct BatchedFactorType::Batch {
+  std::size_t first = 0;
   std::vector<std::vector<double>> states;  ///< of each variable: count × ambient size
   std::vector<double> measurements;
-  std::vector<double> residuals;
+  std::vector<double> residuals;               ///< empty: not all results are finite
   std::vector<std::vector<double>> jacobians;  ///< empty: not asked for yet
 
-  /// Of the inputs, at the present states of a pool.
-  static Batch gather(const BatchedFactorType& type, const FactorView& pool) {
+  /// Of the inputs of factors [begin, end), at the present states of a pool.
+  static Batch gather(const BatchedFactorType& type, const FactorView& pool, std::size_t begin,
+                      std::size_t end) {
     Batch batch;
-    const std::size_t arity = size_of(type.arity());
+    batch.first = begin;
+    const std::size_t arity = size_of(type.arity()), count = end - begin;
     for (std::size_t k = 0; k < arity; ++k) {
       const std::size_t ambient = size_of(type.ambient_size(static_cast<int>(k)));
-      std::vector<double>& rows = batch.states.emplace_back(pool.size * ambient);
-      for (std::size_t f = 0; f < pool.size; ++f) {
-        const double* x = pool.states[k] + size_of(pool.slots[f * arity + k]) * ambient;
+      std::vector<double>& rows = batch.states.emplace_back(count * ambient);
+      for (std::size_t f = 0; f < count; ++f) {
+        const double* x = pool.states[k] + size_of(pool.slots[(begin + f) * arity + k]) * ambient;
         std::copy_n(x, ambient, rows.begin() + static_cast<std::ptrdiff_t>(f * ambient));
       }
     }
-    const std::size_t numbers = pool.size * size_of(type.measurement_size());
-    batch.measurements.assign(pool.measurements, pool.measurements + numbers);
+    const std::size_t size = size_of(type.measurement_size());
+    batch.measurements.assign(pool.measurements + begin * size, pool.measurements + end * size);
     return batch;
+  }
+
+  void evaluate(const BatchedFactorType& type, std::size_t count, bool with_jacobians) {
+    const std::vector<const double*> x = pointers();
+    if (residuals.empty()) {
+      residuals.resize(count * size_of(type.residual_size()));
+      type.residuals(count, x, measurements.data(), residuals.data());
+    }
+    if (!with_jacobians) return;
+    std::vector<double*> out;
+    for (int k = 0; k < type.arity(); ++k) {
+      jacobians.emplace_back(count * size_of(type.residual_size() * type.tangent_size(k)));
+      out.push_back(jacobians.back().data());
+    }
+    type.jacobians(count, x, measurements.data(), out.data());
+  }
+
+  bool is_finite() const {
+    const auto finite = [](const std::vector<double>& numbers) {
+      return std::ranges::all_of(numbers, [](double x) { return std::isfinite(x); });
+    };
+    return finite(residuals) && std::ranges::all_of(jacobians, finite);
   }
 
   std::vector<const double*> pointers() const {
@@ -65,6 +91,9 @@ struct BatchedFactorType::Batch {
     for (const std::vector<double>& rows : states) result.push_back(rows.data());
     return result;
   }
+
+  /// Its inputs alone.
+  Batch without_results() const { return {first, states, measurements, {}, {}}; }
 
   bool same_inputs(const Batch& other) const {
     return states == other.states && measurements == other.measurements;
@@ -74,9 +103,8 @@ struct BatchedFactorType::Batch {
   bool holds(const BatchedFactorType& type, const FactorView& pool, std::size_t begin,
              std::size_t end) const {
     const std::size_t arity = size_of(type.arity()), size = size_of(type.measurement_size());
-    if (measurements.size() != pool.size * size ||
-        residuals.size() != pool.size * size_of(type.residual_size()))
-      return false;
+    if (measurements.size() != pool.size * size) return false;
+    if (states[0].size() != pool.size * size_of(type.ambient_size(0))) return false;
     if (!same(measurements.data() + begin * size, pool.measurements + begin * size,
               (end - begin) * size))
       return false;
@@ -91,7 +119,7 @@ struct BatchedFactorType::Batch {
   }
 };
 
-/// The factors of one evaluated pool, for what the base class does with `evaluate`.
+/// Evaluated factors of one pool, for what the base class does with `evaluate`.
 class BatchedFactorType::Evaluated final : public EvaluatedFactorType {
  public:
   Evaluated(const BatchedFactorType& type, const Batch& batch) : type_(&type), batch_(&batch) {}
@@ -114,13 +142,14 @@ class BatchedFactorType::Evaluated final : public EvaluatedFactorType {
   void evaluate_entry(const FactorView& pool, std::size_t f, double* residual,
                       double* const* jacobians) const override {
     const int n = residual_size();
+    const std::size_t row = f - batch_->first;
     const double* sqrt_information = pool.sqrt_information + pool.noise(f) * packed_size(n);
-    whiten(sqrt_information, n, 1, batch_->residuals.data() + f * size_of(n), residual);
+    whiten(sqrt_information, n, 1, batch_->residuals.data() + row * size_of(n), residual);
     for (int k = 0; jacobians && k < arity(); ++k) {
       if (!jacobians[k]) continue;
       const int columns = tangent_size(k);
       whiten(sqrt_information, n, columns,
-             batch_->jacobians[size_of(k)].data() + f * size_of(n * columns), jacobians[k]);
+             batch_->jacobians[size_of(k)].data() + row * size_of(n * columns), jacobians[k]);
     }
   }
 
@@ -188,26 +217,22 @@ void BatchedFactorType::jacobians(std::size_t count, std::span<const double* con
 std::shared_ptr<const BatchedFactorType::Batch> BatchedFactorType::batch(
     const FactorView& pool, std::size_t begin, std::size_t end, bool with_jacobians) const {
   const std::scoped_lock lock(mutex_);
-  const auto complete = [&](const Batch& b) { return !with_jacobians || !b.jacobians.empty(); };
-  if (latest_ && complete(*latest_) && latest_->holds(*this, pool, begin, end)) return latest_;
-  Batch fresh = Batch::gather(*this, pool);
-  const std::vector<const double*> states = fresh.pointers();
-  if (latest_ && fresh.same_inputs(*latest_)) {
-    fresh.residuals = latest_->residuals;
-  } else {
-    fresh.residuals.resize(pool.size * size_of(residual_size()));
-    residuals(pool.size, states, fresh.measurements.data(), fresh.residuals.data());
+  const bool known = latest_ && latest_->holds(*this, pool, begin, end);
+  if (known && latest_->residuals.empty()) {
+    // What was not finite may have been so once only: nothing of it is kept, and each range is
+    // evaluated by itself, or every range would evaluate all.
+    Batch range = Batch::gather(*this, pool, begin, end);
+    range.evaluate(*this, end - begin, with_jacobians);
+    return std::make_shared<const Batch>(std::move(range));
   }
-  if (with_jacobians) {
-    std::vector<double*> out;
-    for (int k = 0; k < arity(); ++k) {
-      fresh.jacobians.emplace_back(pool.size * size_of(residual_size() * tangent_size(k)));
-      out.push_back(fresh.jacobians.back().data());
-    }
-    jacobians(pool.size, states, fresh.measurements.data(), out.data());
-  }
-  latest_ = std::make_shared<const Batch>(std::move(fresh));
-  return latest_;
+  if (known && (!with_jacobians || !latest_->jacobians.empty())) return latest_;
+  Batch fresh = Batch::gather(*this, pool, 0, pool.size);
+  if (latest_ && fresh.same_inputs(*latest_)) fresh.residuals = latest_->residuals;
+  fresh.evaluate(*this, pool.size, with_jacobians);
+  const bool finite = fresh.is_finite();
+  const auto all = std::make_shared<const Batch>(std::move(fresh));
+  latest_ = finite ? all : std::make_shared<const Batch>(all->without_results());
+  return all;
 }
 
 void BatchedFactorType::squared_norms(const FactorView& pool, std::size_t begin, std::size_t end,

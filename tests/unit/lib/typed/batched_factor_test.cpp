@@ -7,10 +7,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <memory>
+#include <numeric>
+#include <stdexcept>
 #include <vector>
 
 #include "cairn/evaluation/check_factor.hpp"
+#include "cairn/linear/normal_equations.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/typed/build.hpp"
 #include "cairn/typed/run.hpp"
@@ -38,6 +42,7 @@ class Seen final : public BatchedFactorType {
   void residuals(std::size_t count, std::span<const double* const> states,
                  const double* measurements, double* out) const override {
     calls.push_back(count);
+    if (fails && fails(calls.size())) throw std::runtime_error("lost");
     for (std::size_t f = 0; f < count; ++f) {
       const double* pose = states[0] + 3 * f;
       const double dx = states[1][2 * f] - pose[0], dy = states[1][2 * f + 1] - pose[1];
@@ -45,9 +50,12 @@ class Seen final : public BatchedFactorType {
       out[2 * f] = c * dx + s * dy - measurements[2 * f];
       out[2 * f + 1] = c * dy - s * dx - measurements[2 * f + 1];
     }
+    if (is_nan && is_nan(calls.size())) out[count / 2] = std::nan("");
   }
 
   mutable std::vector<std::size_t> calls;
+  /// Of the number of a call: whether it throws, or has a residual that is not a number.
+  std::function<bool(std::size_t)> fails, is_nan;
 };
 
 /// A walk past landmarks; observations of the given type, with correlated information.
@@ -68,6 +76,14 @@ Graph walk(const std::shared_ptr<const FactorType>& type, int poses = 40) {
   }
   graph.set_fixed(0);
   return graph;
+}
+
+/// Of chi2 and of the normal equations.
+bool is_finite_everywhere(const Graph& graph) {
+  const auto solver = default_registry().make<LinearSolver>("block_cholesky");
+  NormalEquations equations(graph, *solver);
+  const double chi2 = equations.linearize(graph.values());
+  return std::isfinite(chi2) && equations.factorize().ok;
 }
 
 TEST(BatchedFactor, IsTheFactorOfFixedSize) {
@@ -115,6 +131,47 @@ TEST(BatchedFactor, ServesSeveralGraphsInTurn) {
   EXPECT_NE(first, second);
   EXPECT_EQ(chi2(one), first);
   EXPECT_EQ(chi2(two), second);
+}
+
+// What is not finite once must not be so for good, nor in other graphs of the same states.
+TEST(BatchedFactor, KeepsNothingThatIsNotFinite) {
+  for (const std::size_t first : {1U, 2U}) {  // the residuals, or differences alone
+    SCOPED_TRACE(first);
+    const auto batched = std::make_shared<Seen>();
+    bool bad = true;
+    batched->is_nan = [&](std::size_t call) { return bad && call >= first; };
+    const Graph graph = walk(batched, 1000), fresh = walk(batched, 1000);
+    const Graph right = walk(std::make_shared<Seen>(), 1000);
+    EXPECT_FALSE(is_finite_everywhere(graph));
+    bad = false;
+    EXPECT_EQ(chi2(graph), chi2(right));
+    EXPECT_TRUE(is_finite_everywhere(graph));
+    EXPECT_EQ(chi2(fresh), chi2(right));
+    EXPECT_TRUE(is_finite_everywhere(fresh));
+  }
+}
+
+TEST(BatchedFactor, IsEvaluatedOnceMoreAtMostWhereItIsNotFinite) {
+  const auto batched = std::make_shared<Seen>();
+  batched->is_nan = [](std::size_t) { return true; };
+  const Graph graph = walk(batched, 1000);
+  const std::size_t count = 4 * 1000 - 6;
+  EXPECT_FALSE(std::isfinite(chi2(graph)));
+  EXPECT_LE(std::accumulate(batched->calls.begin(), batched->calls.end(), std::size_t{0}),
+            2 * count);
+}
+
+TEST(BatchedFactor, KeepsNothingOfACallThatFails) {
+  for (const std::size_t bad : {1U, 2U, 5U}) {
+    SCOPED_TRACE(bad);
+    const auto batched = std::make_shared<Seen>();
+    batched->fails = [bad](std::size_t call) { return call == bad; };
+    Graph graph = walk(batched, 1000);
+    const Graph right = walk(std::make_shared<Seen>(), 1000);
+    EXPECT_THROW(is_finite_everywhere(graph), Error);
+    EXPECT_EQ(chi2(graph), chi2(right));
+    EXPECT_TRUE(is_finite_everywhere(graph));
+  }
 }
 
 TEST(BatchedFactor, HasRightJacobiansByDifferences) {
