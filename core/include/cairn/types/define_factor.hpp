@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <concepts>
 #include <memory>
 #include <string>
 #include <tuple>
@@ -15,6 +16,7 @@
 #include "cairn/types/autodiff.hpp"
 #include "cairn/types/define_variable.hpp"
 #include "cairn/types/factor_type.hpp"
+#include "cairn/types/member_names.hpp"
 #include "cairn/types/never_throws.hpp"
 
 namespace cairn {
@@ -45,6 +47,7 @@ namespace cairn {
 ///  - `static constexpr int kAbsolute`: `FactorType::absolute_size`, of a factor between variables
 ///    that a rigid motion of all of them changes all the same;
 ///  - `static constexpr std::string_view kMetric`: the name of the error metric.
+/// An optional function that is there with another signature is an error of the compiler.
 ///
 /// Where `residual`, and `evaluate` if there is one, are `noexcept`, the type `NeverThrows`: an
 /// estimator then takes in its factors without keeping what it would go back to.
@@ -64,16 +67,32 @@ template <class F,
           class Indices = std::make_index_sequence<std::tuple_size_v<typename F::Variables>>>
 class DefinedFactor;
 
+/// Whether a struct has an `evaluate` with analytic Jacobians as it is called.
+template <class F, class... V>
+constexpr bool has_evaluate(const std::tuple<V...>*) {
+  return requires(const Vector<double, V::kAmbient>&... x, const Vector<double, F::kMeasurement>& z,
+                  Eigen::Matrix<double, F::kResidual, V::kTangent>&... J) {
+    { F::evaluate(x..., z, J...) } -> std::convertible_to<Vector<double, F::kResidual>>;
+  };
+}
+template <class F>
+concept HasEvaluate = has_evaluate<F>(static_cast<typename F::Variables*>(nullptr));
+template <class F>
+concept NormalizesMeasurement = requires(Vector<double, F::kMeasurement>& z) {
+  { F::normalize(z) } -> std::convertible_to<std::string>;
+};
+template <class F>
+concept HasPropagate = requires(const double* const* x, const double* z, double* out) {
+  { F::propagate(0, x, z, out) } -> std::convertible_to<bool>;
+};
+
 /// Whether a struct's functions are `noexcept`.
 template <class F, class... V>
 constexpr bool never_throws(const std::tuple<V...>*) {
   using Z = Vector<double, F::kMeasurement>;
   constexpr bool error = noexcept(F::template residual<double>(
       std::declval<const Vector<double, V::kAmbient>&>()..., std::declval<const Z&>()));
-  if constexpr (requires(const Vector<double, V::kAmbient>&... x, const Z& z,
-                         Eigen::Matrix<double, F::kResidual, V::kTangent>&... J) {
-                  F::evaluate(x..., z, J...);
-                }) {
+  if constexpr (HasEvaluate<F>) {
     constexpr bool analytic = noexcept(
         F::evaluate(std::declval<const Vector<double, V::kAmbient>&>()..., std::declval<const Z&>(),
                     std::declval<Eigen::Matrix<double, F::kResidual, V::kTangent>&>()...));
@@ -93,6 +112,20 @@ class DefinedFactor<F, std::index_sequence<I...>> final
   static constexpr int kR = F::kResidual, kZ = F::kMeasurement;
   static constexpr int kU = kR * (kR + 1) / 2;
   static constexpr int kPairs = kArity * (kArity + 1) / 2;
+  static_assert(
+      !Names_evaluate<F> || HasEvaluate<F>,
+      "this factor has an `evaluate` that would be ignored, since it is not called like "
+      "this: static Vector<S, kResidual> evaluate(const Vector<S, V::kAmbient>& x..., "
+      "const Vector<S, kMeasurement>& z, Eigen::Matrix<S, kResidual, V::kTangent>& J...), "
+      "with a state x and a Jacobian J by reference for each variable V, for S = double "
+      "at least");
+  static_assert(!Names_normalize<F> || NormalizesMeasurement<F>,
+                "this factor has a `normalize` that would be ignored, since it is not called like "
+                "this: static std::string normalize(Vector<double, kMeasurement>& z)");
+  static_assert(!Names_propagate<F> || HasPropagate<F>,
+                "this factor has a `propagate` that would be ignored, since it is not called like "
+                "this: static bool propagate(int target, const double* const* x, const double* z, "
+                "double* out)");
   template <std::size_t K>
   using V = std::tuple_element_t<K, typename F::Variables>;
   // S is double, or a pack with one lane for each of several factors.
@@ -122,7 +155,7 @@ class DefinedFactor<F, std::index_sequence<I...>> final
   static constexpr bool kNarrow = Places::kNumbers + kR * (V<I>::kTangent + ...) <= 4096;
   template <class S>
   static constexpr bool kDifferentiates =
-      kAnalytic<double> ? kAnalytic<S> : kComputes<S, Dual<(V<I>::kTangent + ...), S>>;
+      HasEvaluate<F> ? kAnalytic<S> : kComputes<S, Dual<(V<I>::kTangent + ...), S>>;
 
   template <class S>
   static Vector<S, kR> error(const States<S>& x, const Vector<S, kZ>& z) {
@@ -131,7 +164,7 @@ class DefinedFactor<F, std::index_sequence<I...>> final
   template <class S>
   static Vector<S, kR> error_and_jacobians(const States<S>& x, const Vector<S, kZ>& z,
                                            Jacobians<S>& jacobians) {
-    if constexpr (kAnalytic<double>)
+    if constexpr (HasEvaluate<F>)
       return F::evaluate(std::get<I>(x)..., z, std::get<I>(jacobians)...);
     else
       return autodiff::evaluate<F>(x, z, jacobians);
@@ -233,7 +266,7 @@ class DefinedFactor<F, std::index_sequence<I...>> final
     return kSizes[variable];
   }
   std::string normalize(double* measurement) const override {
-    if constexpr (requires(Z & z) { F::normalize(z); }) {
+    if constexpr (NormalizesMeasurement<F>) {
       Z z = load<kZ>(measurement);
       std::string problem = F::normalize(z);
       store<kZ>(z, measurement);
@@ -326,8 +359,7 @@ class DefinedFactor<F, std::index_sequence<I...>> final
   }
 
   bool propagate(int target, const double* const* x, const double* z, double* out) const override {
-    if constexpr (requires { F::propagate(target, x, z, out); })
-      return F::propagate(target, x, z, out);
+    if constexpr (HasPropagate<F>) return F::propagate(target, x, z, out);
     return false;
   }
   bool is_relative() const override {

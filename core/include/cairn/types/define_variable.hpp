@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <concepts>
 #include <memory>
 #include <string>
 
@@ -8,6 +9,7 @@
 
 #include "cairn/pack/dual.hpp"
 #include "cairn/pack/products.hpp"
+#include "cairn/types/member_names.hpp"
 #include "cairn/types/variable_type.hpp"
 
 namespace cairn {
@@ -44,6 +46,7 @@ using Measured = Vector<ValueOf<S>, N>;
 ///    `Placement`;
 ///  - `static constexpr bool kPacks = true`: `retract` takes packs as well (`cairn/pack/pack.hpp`),
 ///    and is called for several states at a time.
+/// A `normalize` or `retract_jacobian` with another signature is an error of the compiler.
 template <class V>
 concept VariableTraits = requires(const Vector<double, V::kAmbient>& x,
                                   const Vector<double, V::kTangent>& delta) {
@@ -67,6 +70,13 @@ void store(const Vector<double, N>& v, double* p) {
 template <class V>
 concept HasNormalize = requires(Vector<double, V::kAmbient>& x) {
   { V::normalize(x) } -> std::convertible_to<std::string>;
+};
+template <class V>
+concept HasRetractJacobian = requires(const Vector<double, V::kAmbient>& x,
+                                      const Vector<double, V::kTangent>& delta) {
+  {
+    V::retract_jacobian(x, delta)
+    } -> std::convertible_to<Eigen::Matrix<double, V::kTangent, V::kTangent>>;
 };
 template <class V>
 concept HasGroup = requires(const Vector<double, V::kAmbient>& a) {
@@ -133,6 +143,14 @@ class PlacementOf final : public Placement {
 template <VariableTraits V>
 class DefinedVariable final : public VariableType {
   static constexpr int kA = V::kAmbient, kT = V::kTangent;
+  static_assert(!Names_normalize<V> || HasNormalize<V>,
+                "this variable has a `normalize` that would be ignored, since it is not called "
+                "like this: static std::string normalize(Vector<double, kAmbient>& x)");
+  static_assert(!Names_retract_jacobian<V> || HasRetractJacobian<V>,
+                "this variable has a `retract_jacobian` that would be ignored, since it is not "
+                "called like this: static Eigen::Matrix<double, kTangent, kTangent> "
+                "retract_jacobian(const Vector<double, kAmbient>& x, "
+                "const Vector<double, kTangent>& delta)");
   static constexpr bool kInPacks = [] {
     if constexpr (requires { V::kPacks; }) return V::kPacks;
     return false;
@@ -170,7 +188,7 @@ class DefinedVariable final : public VariableType {
     const Vector<double, kA> from = load<kA>(x);
     const Vector<double, kT> step = load<kT>(delta);
     Eigen::Map<Eigen::Matrix<double, kT, kT>> out{D};
-    if constexpr (requires { V::retract_jacobian(from, step); }) {
+    if constexpr (HasRetractJacobian<V>) {
       out = V::retract_jacobian(from, step);
     } else {
       const Vector<double, kA> there = V::template retract<double>(from, step);
