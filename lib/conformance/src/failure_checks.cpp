@@ -13,7 +13,7 @@
 
 #include "cairn/runtime/error.hpp"
 #include "cairn/solve/estimator.hpp"
-#include "cairn/types/evaluated_factor.hpp"
+#include "cairn/types/wrapped_factor.hpp"
 #include "repetition.hpp"
 #include "sample_graph.hpp"
 #include "samples.hpp"
@@ -25,37 +25,17 @@ constexpr int kPoses = 12;
 constexpr int kMostPlaces = 6;  // at which one update fails
 
 /// A relative pose whose evaluations are counted, and one of which throws.
-class FailingFactor final : public EvaluatedFactorType {
+class FailingFactor final : public WrappedFactorType {
  public:
-  explicit FailingFactor(std::shared_ptr<const FactorType> type) : type_(std::move(type)) {}
+  using WrappedFactorType::WrappedFactorType;
   mutable std::atomic<int> evaluations{0};
   std::atomic<int> fails_at{0};  ///< 0: at none
 
-  std::string_view tag() const override { return type_->tag(); }
-  int arity() const override { return type_->arity(); }
-  std::span<const std::string_view> variable_tags() const override {
-    return type_->variable_tags();
-  }
-  int residual_size() const override { return type_->residual_size(); }
-  int measurement_size() const override { return type_->measurement_size(); }
-  int tangent_size(int variable) const override { return type_->tangent_size(variable); }
-  int ambient_size(int variable) const override { return type_->ambient_size(variable); }
-  std::string normalize(double* measurement) const override {
-    return type_->normalize(measurement);
-  }
   void evaluate(const double* const* x, const double* measurement, const double* sqrt_information,
                 double* residual, double* const* jacobians) const override {
     if (++evaluations == fails_at) throw std::runtime_error("this factor fails, as it is to");
-    type_->evaluate(x, measurement, sqrt_information, residual, jacobians);
+    WrappedFactorType::evaluate(x, measurement, sqrt_information, residual, jacobians);
   }
-  bool propagate(int target, const double* const* x, const double* measurement,
-                 double* out) const override {
-    return type_->propagate(target, x, measurement, out);
-  }
-  bool is_relative() const override { return type_->is_relative(); }
-
- private:
-  std::shared_ptr<const FactorType> type_;
 };
 
 struct Step {

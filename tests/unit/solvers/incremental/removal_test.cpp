@@ -18,7 +18,7 @@
 #include "cairn/runtime/error.hpp"
 #include "cairn/solve/estimator.hpp"
 #include "cairn/types/define_factor.hpp"
-#include "cairn/types/evaluated_factor.hpp"
+#include "cairn/types/wrapped_factor.hpp"
 #include "support/dense_algebra.hpp"
 #include "support/planar_graph.hpp"
 
@@ -27,40 +27,20 @@ namespace {
 
 /// A relative pose that counts how often it is evaluated, and whose derivatives can become
 /// infinite.
-class Watched final : public EvaluatedFactorType {
+class Watched final : public WrappedFactorType {
  public:
-  explicit Watched(std::shared_ptr<const FactorType> type) : type_(std::move(type)) {}
+  using WrappedFactorType::WrappedFactorType;
   mutable int evaluations = 0;
   bool broken = false;
 
-  std::string_view tag() const override { return type_->tag(); }
-  int arity() const override { return type_->arity(); }
-  std::span<const std::string_view> variable_tags() const override {
-    return type_->variable_tags();
-  }
-  int residual_size() const override { return type_->residual_size(); }
-  int measurement_size() const override { return type_->measurement_size(); }
-  int tangent_size(int variable) const override { return type_->tangent_size(variable); }
-  int ambient_size(int variable) const override { return type_->ambient_size(variable); }
-  std::string normalize(double* measurement) const override {
-    return type_->normalize(measurement);
-  }
   void evaluate(const double* const* x, const double* measurement, const double* sqrt_information,
                 double* residual, double* const* jacobians) const override {
     ++evaluations;
-    type_->evaluate(x, measurement, sqrt_information, residual, jacobians);
+    WrappedFactorType::evaluate(x, measurement, sqrt_information, residual, jacobians);
     for (int k = 0; broken && jacobians && k < arity(); ++k) {
       if (jacobians[k]) jacobians[k][0] = std::numeric_limits<double>::infinity();
     }
   }
-  bool propagate(int target, const double* const* x, const double* measurement,
-                 double* out) const override {
-    return type_->propagate(target, x, measurement, out);
-  }
-  bool is_relative() const override { return type_->is_relative(); }
-
- private:
-  std::shared_ptr<const FactorType> type_;
 };
 
 class Removal : public testing::Test {

@@ -9,8 +9,8 @@
 #include <string_view>
 #include <utility>
 
-#include "cairn/types/evaluated_factor.hpp"
 #include "cairn/types/loss.hpp"
+#include "cairn/types/wrapped_factor.hpp"
 #include "support/planar_graph.hpp"
 
 namespace cairn::test {
@@ -31,37 +31,23 @@ struct Fuse {
 };
 
 /// A factor type as another one, whose evaluations burn a fuse.
-class ThrowingFactor final : public EvaluatedFactorType {
+class ThrowingFactor final : public WrappedFactorType {
  public:
   ThrowingFactor(std::shared_ptr<const FactorType> type, std::shared_ptr<Fuse> fuse)
-      : type_(std::move(type)), fuse_(std::move(fuse)) {}
+      : WrappedFactorType(std::move(type)), fuse_(std::move(fuse)) {}
 
-  std::string_view tag() const override { return type_->tag(); }
-  int arity() const override { return type_->arity(); }
-  std::span<const std::string_view> variable_tags() const override {
-    return type_->variable_tags();
-  }
-  int residual_size() const override { return type_->residual_size(); }
-  int measurement_size() const override { return type_->measurement_size(); }
-  int tangent_size(int variable) const override { return type_->tangent_size(variable); }
-  int ambient_size(int variable) const override { return type_->ambient_size(variable); }
-  std::string normalize(double* measurement) const override {
-    return type_->normalize(measurement);
-  }
   void evaluate(const double* const* x, const double* measurement, const double* sqrt_information,
                 double* residual, double* const* jacobians) const override {
     fuse_->evaluate();
-    type_->evaluate(x, measurement, sqrt_information, residual, jacobians);
+    WrappedFactorType::evaluate(x, measurement, sqrt_information, residual, jacobians);
   }
   bool propagate(int target, const double* const* x, const double* measurement,
                  double* out) const override {
     fuse_->evaluate();
-    return type_->propagate(target, x, measurement, out);
+    return WrappedFactorType::propagate(target, x, measurement, out);
   }
-  bool is_relative() const override { return type_->is_relative(); }
 
  private:
-  std::shared_ptr<const FactorType> type_;
   std::shared_ptr<Fuse> fuse_;
 };
 
