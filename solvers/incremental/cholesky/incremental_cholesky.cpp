@@ -20,6 +20,7 @@
 #include "cairn/update/elimination.hpp"
 #include "cairn/update/graph_update.hpp"
 #include "cairn/update/initial_states.hpp"
+#include "record.hpp"
 
 namespace cairn::incremental {
 namespace {
@@ -36,32 +37,6 @@ bool takes_out(const GraphUpdate& update) {
 }
 
 }  // namespace
-
-/// Updates from one copy on, so that the state after all of them can be had again: the copy, what
-/// was done since, and what others have answered meanwhile.
-struct IncrementalCholesky::Record {
-  /// Of less it is no use to make another copy.
-  static constexpr std::size_t kBytes = std::size_t{1} << 20;
-  static constexpr std::size_t kSteps = 256;
-
-  explicit Record(const IncrementalCholesky& of)
-      : before(std::make_unique<IncrementalCholesky>(of)) {}
-
-  /// Whether to begin anew from a copy costs no more than what was recorded.
-  bool is_long() const {
-    const auto bytes = static_cast<std::size_t>(8 * before->engine_->doubles());
-    const auto variables = static_cast<std::size_t>(before->variables_);
-    return answers.bytes() > std::max(kBytes, bytes) ||
-           steps.size() > std::max(kSteps, variables / 4);
-  }
-
-  std::unique_ptr<IncrementalCholesky> before;
-  std::vector<std::function<void(IncrementalCholesky&)>> steps;
-  Answers answers;
-  // Of the update at hand:
-  Answers::Place begin;
-  Pace pace;
-};
 
 IncrementalCholesky::IncrementalCholesky(const IncrementalCholeskyOptions& options,
                                          std::shared_ptr<Rescuer> rescuer)
@@ -87,23 +62,6 @@ IncrementalCholesky::IncrementalCholesky(const IncrementalCholesky& other)
 
 IncrementalCholesky::~IncrementalCholesky() = default;
 
-void IncrementalCholesky::become(IncrementalCholesky&& other) {
-  engine_ = std::move(other.engine_);
-  variables_ = other.variables_;
-  factors_ = other.factors_;
-  losses_ = std::move(other.losses_);
-  since_solved_ = other.since_solved_;
-  since_full_ = other.since_full_;
-  kept_ = other.kept_;
-  told_ = std::move(other.told_);
-  has_removed_ = other.has_removed_;
-  watch_ = other.watch_;
-  watched_load_ = other.watched_load_;
-  forget_what_was_read();
-}
-
-// --- updates that fail ---
-
 void IncrementalCholesky::refuse_if_lost() const {
   if (!lost_) [[likely]]
     return;
@@ -112,67 +70,9 @@ void IncrementalCholesky::refuse_if_lost() const {
               "undone; reset it, or go on with a copy from before");
 }
 
-/// Whether something in the update, if it is evaluated, may throw.
-bool IncrementalCholesky::may_throw(const GraphUpdate& update) {
-  for (const Factor& factor : update.factors) {
-    if (factor.loss && !dynamic_cast<const NeverThrows*>(factor.loss.get())) return true;
-    if (!factor.type || factor.type == harmless_) continue;
-    if (!dynamic_cast<const NeverThrows*>(factor.type.get())) return true;
-    harmless_ = factor.type;
-  }
-  return false;
-}
-
-/// The update that follows is recorded as the next step, with what others answer meanwhile.
-void IncrementalCholesky::begin_step(const UpdateOptions& options) {
-  if (!record_ || record_->is_long()) {
-    record_.reset();
-    record_ = std::make_unique<Record>(*this);
-  }
-  record_->begin = record_->answers.end();
-  record_->pace = engine_->pace();
-  record_->steps.emplace_back(
-      [options](IncrementalCholesky& also) { also.carry_out({}, options); });
-  keep_answers(&record_->answers);
-}
-
-/// Takes back the step that was begun last.
-void IncrementalCholesky::forget_step() {
-  keep_answers(nullptr);
-  if (!record_) return;
-  record_->steps.pop_back();
-  record_->answers.cut(record_->begin);
-}
-
 void IncrementalCholesky::keep_answers(Answers* answers) {
   answers_.in(answers);
   engine_->keep_answers(answers);
-}
-
-/// Undoes the update that has failed: to the last bit, or else nothing can be done with the
-/// estimator any more. A journal does not have what was refused.
-void IncrementalCholesky::go_back() {
-  lost_ = true;
-  try {
-    if (before_) {
-      become(std::move(*before_));
-    } else if (record_) {
-      Record& record = *record_;
-      record.answers.repeat(true);
-      auto again = std::make_unique<IncrementalCholesky>(*record.before);
-      again->keep_answers(&record.answers);
-      for (const auto& step : record.steps) step(*again);
-      again->keep_answers(nullptr);
-      again->engine_->set_pace(record.pace);
-      become(std::move(*again));
-      record_.reset();  // the next one begins here
-    } else {
-      return;
-    }
-    lost_ = false;
-  } catch (...) {  // the first failure is the one to be reported
-    record_.reset();
-  }
 }
 
 // --- updates ---
