@@ -37,6 +37,100 @@ def test_it_stops_with_the_best_estimate():
     assert (ended.returncode, ended.stdout) == (0, "went on\n"), ended.stderr
 
 
+def test_ctrl_c_and_exit_in_a_factor_end_an_update_as_they_are_and_leave_the_estimator():
+    ended = run(
+        """
+        import numpy as np
+        calls, at = [], [None, None]
+
+        def residual(pose, point, measured):
+            calls.append(1)
+            if len(calls) == at[0]:
+                at[1]()
+            return np.hypot(*(point - pose[:, :2]).T)[:, None] - measured
+
+        def press():
+            os.kill(os.getpid(), signal.SIGINT)
+            for _ in range(10**6): pass
+
+        def leave():
+            raise SystemExit(3)
+
+        distance = cairn.FactorType("EDGE_DISTANCE", [cairn.Pose2, cairn.Point2], residual, residual_size=1, measurement_size=1)
+
+        def built(name):
+            estimator = cairn.Estimator(name)
+            estimator.add(0, cairn.Pose2(), fixed=True)
+            estimator.add(1, cairn.Pose2(1, 0, 0))
+            estimator.add(100, cairn.Point2(3, 4))
+            estimator.add(cairn.Between(0, 1, cairn.Pose2(1, 0, 0)), sigmas=0.1)
+            estimator.add(cairn.Observation(0, 100, cairn.Point2(3, 4)), sigmas=0.2)
+            estimator.add(cairn.Measurement(distance, [0, 100], [5.0]), sigmas=0.1)
+            estimator.update()
+            return estimator
+
+        def grow(estimator):
+            estimator.add(2, cairn.Pose2(2, 0, 0))
+            estimator.add(cairn.Between(1, 2, cairn.Pose2(1, 0.1, 0)), sigmas=0.1)
+            estimator.add(cairn.Measurement(distance, [2, 100], [4.0]), sigmas=0.1)
+            estimator.update()
+
+        raised = 0
+        for name in cairn.components("estimator"):
+            for end, kind in ((press, KeyboardInterrupt), (leave, SystemExit)):
+                for call in range(1, 8):
+                    at[0] = None
+                    estimator, twin = built(name), built(name)
+                    calls.clear()
+                    at[:] = call, end
+                    try:
+                        grow(estimator)
+                    except kind:
+                        raised += 1
+                        at[0] = None
+                        assert estimator.variable_count == twin.variable_count, (name, call)
+                        assert estimator.chi2() == twin.chi2(), (name, call)
+                    at[0] = None
+                    if len(calls) < call:
+                        break
+                    if estimator.variable_count == 3:
+                        grow(estimator)
+                    grow(twin)
+                    assert estimator.chi2() == twin.chi2(), (name, call)
+        print("raised" if raised > 20 else raised)
+        """
+    )
+    assert (ended.returncode, ended.stdout) == (0, "raised\n"), ended.stderr
+
+
+def test_exit_in_a_factor_passes_whatever_calls_it():
+    ended = run(
+        """
+        import numpy as np
+        armed = [False]
+
+        def residual(pose, measured):
+            if armed[0]:
+                raise SystemExit(3)
+            return pose - measured
+
+        known = cairn.FactorType("EDGE_KNOWN", [cairn.Pose2], residual, residual_size=3, measurement_size=3)
+        graph.add(cairn.Measurement(known, [0], graph.at(0).state), sigmas=0.1)
+        for call in (graph.chi2, lambda: cairn.optimize(graph.copy()), lambda: cairn.optimize(graph.copy(), "dogleg", initial=None),
+                     lambda: cairn.marginals(graph, [1]), lambda: known.check([graph.at(0).state], graph.at(0).state)):
+            armed[0] = True
+            try:
+                call()
+                print("nothing", call)
+            except SystemExit as exit:
+                assert exit.code == 3
+            armed[0] = False
+        print("passed")
+        """
+    )
+    assert (ended.returncode, ended.stdout) == (0, "passed\n"), ended.stderr
+
+
 def test_it_stops_without_a_callback_too():
     ended = run(
         """

@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "bindings.hpp"
+#include "cairn/runtime/interruption.hpp"
 #include "missing.hpp"
 
 namespace cairn::python {
@@ -61,6 +62,14 @@ py::object made(PyObject* type, const Error& error) {
   return instance;
 }
 
+void raise_again(const std::exception_ptr& cause) {
+  try {
+    std::rethrow_exception(cause);
+  } catch (py::error_already_set& error) {
+    error.restore();
+  }
+}
+
 void translate(std::exception_ptr thrown) {
   try {
     if (thrown) std::rethrow_exception(thrown);
@@ -71,6 +80,8 @@ void translate(std::exception_ptr thrown) {
     PyErr_SetObject(classes.missing_file, instance.ptr());
   } catch (const MissingKey& error) {
     PyErr_SetObject(classes.missing_key, made(classes.missing_key, error).ptr());
+  } catch (const Interruption& interruption) {
+    raise_again(interruption.cause());
   } catch (const Error& error) {
     const bool invalid = error.code() == ErrorCode::usage || error.code() == ErrorCode::input;
     PyObject* const type = invalid ? classes.invalid : classes.error;

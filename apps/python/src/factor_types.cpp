@@ -94,7 +94,6 @@ double largest_deviation(const PythonFactor& factor, const py::sequence& states,
     throw Error(ErrorCode::usage, fmt::format("measurement: {} numbers, expected {}",
                                               measured.size(), factor.measurement_size()));
   }
-  const InterruptsPass pass;
   if (const auto angle = find_unwrapped_angle(factor, types, x, span_of(measured))) {
     throw Error(
         ErrorCode::plugin,

@@ -2,6 +2,7 @@
 #include "python_factor.hpp"
 
 #include <algorithm>
+#include <exception>
 #include <optional>
 #include <string>
 #include <utility>
@@ -11,6 +12,7 @@
 
 #include "arrays.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/interruption.hpp"
 #include "interrupt.hpp"
 
 namespace cairn::python {
@@ -43,17 +45,11 @@ std::string text_of(const py::error_already_set& error) {
              innermost.attr("tb_lineno").cast<int>());
 }
 
-thread_local bool interrupts_pass = false;
-
-bool passes(const py::error_already_set& error) {
-  return interrupts_pass && !error.matches(PyExc_Exception);
-}
+/// Whether it is to end whatever called the function, as Ctrl-C does (KeyboardInterrupt) or
+/// sys.exit().
+bool ends_the_call(const py::error_already_set& error) { return !error.matches(PyExc_Exception); }
 
 }  // namespace
-
-InterruptsPass::InterruptsPass() : before_(std::exchange(interrupts_pass, true)) {}
-
-InterruptsPass::~InterruptsPass() { interrupts_pass = before_; }
 
 PythonFactor::PythonFactor(Description description, py::object residual, py::object jacobians)
     : BatchedFactorType(std::move(description)),
@@ -87,12 +83,12 @@ py::object PythonFactor::call(const py::object& function, std::size_t count,
     try {
       return function(*arguments);
     } catch (const py::error_already_set& error) {
-      // Ctrl-C ends the optimisation, with its best estimate, after what is being computed.
-      if (passes(error) || !error.matches(PyExc_KeyboardInterrupt) || !interrupted()) throw;
+      // Ctrl-C ends an optimisation with its best estimate, after what is being computed.
+      if (!error.matches(PyExc_KeyboardInterrupt) || !interrupted()) throw;
     }
     return function(*arguments);
   } catch (const py::error_already_set& error) {
-    if (passes(error)) throw;
+    if (ends_the_call(error)) throw Interruption(std::current_exception());
     throw Error(ErrorCode::plugin,
                 fmt::format("factor '{}', written in Python: {}", tag(), text_of(error)));
   }

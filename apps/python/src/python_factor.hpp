@@ -13,7 +13,10 @@ namespace cairn::python {
 
 namespace py = pybind11;
 
-/// A factor type whose residual is a function written in Python, called with arrays.
+/// A factor type whose residual is a function written in Python, called with arrays. What it raises
+/// is an `Error` (plugin); what is no Exception of Python, as after Ctrl-C, is an `Interruption`,
+/// so that the caller gets it as it is. An optimisation obeys Ctrl-C otherwise (`InterruptGuard`),
+/// and keeps its best estimate.
 class PythonFactor final : public BatchedFactorType {
  public:
   /// residual(states…, measured) → (n, residual size). jacobians(states…, measured) → one array (n,
@@ -42,20 +45,6 @@ class PythonFactor final : public BatchedFactorType {
                     double* out) const;
 
   py::object residual_, jacobians_;
-};
-
-/// While one exists, what a factor's function raises that is no Exception, as Ctrl-C does
-/// (KeyboardInterrupt), passes through this thread's calls as it is. An optimisation obeys Ctrl-C
-/// otherwise (`InterruptGuard`), and keeps its best estimate.
-class InterruptsPass {
- public:
-  InterruptsPass();
-  InterruptsPass(const InterruptsPass&) = delete;
-  InterruptsPass& operator=(const InterruptsPass&) = delete;
-  ~InterruptsPass();
-
- private:
-  bool before_;
 };
 
 /// The factor type that a Python object is, or null if it is none.

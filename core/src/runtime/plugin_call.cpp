@@ -5,6 +5,7 @@
 #include <new>
 
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/interruption.hpp"
 
 namespace cairn {
 
@@ -12,6 +13,8 @@ void rethrow_as_plugin_error(const std::string& component) {
   try {
     throw;
   } catch (const Error&) {
+    throw;
+  } catch (const Interruption&) {
     throw;
   } catch (const std::bad_alloc&) {
     throw;

@@ -7,9 +7,9 @@
 
 namespace cairn {
 
-/// Throws the exception being handled again: `Error` and `std::bad_alloc` as they are, everything
-/// else as `Error` (plugin) with the message "`component` failed: " and what the exception says. To
-/// be called in a handler.
+/// Throws the exception being handled again: `Error`, `Interruption` and `std::bad_alloc` as they
+/// are, everything else as `Error` (plugin) with the message "`component` failed: " and what the
+/// exception says. To be called in a handler.
 [[noreturn]] CAIRN_API void rethrow_as_plugin_error(const std::string& component);
 
 /// Returns `work()`, which runs code of a plugin, and names the plugin's component in what escapes
