@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Errors are cairn.Error, and of Python's own kinds beside it."""
 import copy
+import errno
 import os
 import pickle
 import subprocess
@@ -81,13 +82,47 @@ def test_a_value_that_does_not_fit(call):
     assert isinstance(raised(lambda: call(pair())), ValueError)
 
 
+@pytest.mark.parametrize("call, number, kind", [
+    (lambda folder: cairn.read(folder), errno.EISDIR, IsADirectoryError),
+    (lambda folder: pair().write(folder, format="g2o"), errno.EISDIR, IsADirectoryError),
+    (lambda folder: cairn.read(folder / "locked" / "x.g2o"), errno.ENOTDIR, OSError),
+    (lambda folder: pair().write("/dev/full", format="g2o"), errno.ENOSPC, OSError),
+])
+def test_what_the_system_refuses_about_a_file(tmp_path, call, number, kind):
+    (tmp_path / "locked").write_text("")
+    error = raised(lambda: call(tmp_path))
+    assert isinstance(error, cairn.FileError) and isinstance(error, kind) and not isinstance(error, ValueError)
+    assert error.errno == number and error.filename and error.kind == "input"
+    assert str(error) == error.args[0] and error.filename in str(error)
+
+
+@pytest.mark.parametrize("call", [
+    lambda graph: cairn.optimize(graph, "doglegs"),
+    lambda graph: cairn.optimize(graph, linear_solver="nope"),
+    lambda graph: cairn.optimize(graph, initial="nope"),
+    lambda graph: cairn.optimize(graph, loss="nope"),
+    lambda graph: cairn.Estimator("nope"),
+    lambda graph: cairn.marginals(graph, [1], linear_solver="nope"),
+    lambda graph: graph.add_factors("EDGE_NOPE", [[0, 1]], [[0, 0, 0]], sigmas=1),
+])
+def test_a_name_that_is_not_on_offer(call):
+    error = raised(lambda: call(pair()))
+    assert isinstance(error, ValueError) and error.kind == "plugin" and "there is no" in str(error)
+
+
 def test_the_others_are_of_no_other_kind():
-    error = raised(lambda: cairn.optimize(pair(), "doglegs"))
+    def broken(pose, measured):
+        raise ValueError("broken")
+
+    graph = pair()
+    graph.add(cairn.Measurement(cairn.FactorType("EDGE_BROKEN", [cairn.Pose2], broken, residual_size=3, measurement_size=3),
+                                [1], [0, 0, 0]), sigmas=1)
+    error = raised(graph.chi2)
     assert type(error) is cairn.Error and error.kind == "plugin"
 
 
 def test_errors_pass_to_other_processes(tmp_path):
-    for call in (lambda: pair().at(9), lambda: cairn.read(tmp_path / "none"), lambda: pair().add(-1, cairn.Pose2())):
+    for call in (lambda: pair().at(9), lambda: cairn.read(tmp_path / "none"), lambda: cairn.read(tmp_path), lambda: pair().add(-1, cairn.Pose2())):
         error = raised(call)
         again = pickle.loads(pickle.dumps(error))
         assert type(again) is type(error) and str(again) == str(error) and again.kind == error.kind

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "cairn/graph/graph.hpp"
+#include "cairn/io/file_error.hpp"
 #include "cairn/runtime/error.hpp"
 
 /// Errors of what is not there, which Python has kinds of exceptions for.
@@ -40,6 +41,8 @@ auto with_file(const std::filesystem::path& file, const std::filesystem::path& n
                const Work& work) {
   try {
     return work();
+  } catch (const FileError&) {  // the system has said what it is
+    throw;
   } catch (const Error& error) {
     std::error_code problem;
     const bool there = needed.empty() || std::filesystem::exists(needed, problem) || problem;

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "cairn/plugin/plugin_search.hpp"
+#include "cairn/plugin/unknown_name.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/text/spelling.hpp"
@@ -161,7 +162,7 @@ struct Registry::Impl {
         message += fmt::format("\n  it is in the Debian package {}", package);
       for (const PluginProblem& problem : problems)
         message += fmt::format("\n  note: {}", problem.message);
-      throw plugin_error(message);
+      throw UnknownName(message);
     }
     if (it->second.size() > 1) throw plugin_error(conflict(kind, name, it->second));
     return *it->second.front();

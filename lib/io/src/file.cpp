@@ -19,6 +19,7 @@
 #include <fmt/core.h>
 
 #include "cairn/io/descriptor.hpp"
+#include "cairn/io/file_error.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/io/output_file.hpp"
 #include "cairn/runtime/error.hpp"
@@ -36,16 +37,20 @@ constexpr std::size_t kMostUnpacked = std::size_t{1} << 28, kMostExpansion = 200
   throw Error(ErrorCode::input, fmt::format("{}: {}", file.string(), what));
 }
 
-std::string system_message(int number) { return std::generic_category().message(number); }
+/// For what the system has refused: `number` is its errno.
+[[noreturn]] void fail(const fs::path& file, const std::string& what, int number) {
+  throw FileError(
+      fmt::format("{}: {}: {}", file.string(), what, std::generic_category().message(number)), file,
+      number);
+}
 
 std::string read_bytes(const fs::path& file) {
   Descriptor input(::open(file.c_str(), O_RDONLY | O_CLOEXEC));
-  if (input.number() < 0) fail(file, "cannot be opened: " + system_message(errno));
+  if (input.number() < 0) fail(file, "cannot be opened", errno);
   struct stat status {};
-  if (::fstat(input.number(), &status) != 0) {
-    fail(file, "cannot be examined: " + system_message(errno));
-  }
-  if (S_ISDIR(status.st_mode)) fail(file, "is a folder; expected a file");
+  if (::fstat(input.number(), &status) != 0) fail(file, "cannot be examined", errno);
+  if (S_ISDIR(status.st_mode))
+    throw FileError(file.string() + ": is a folder; expected a file", file, EISDIR);
   // Others, such as /dev/zero, may never end.
   const bool null = status.st_rdev == makedev(1, 3);
   if (S_ISCHR(status.st_mode) && !null && ::isatty(input.number()) == 0)
@@ -59,7 +64,7 @@ std::string read_bytes(const fs::path& file) {
     if (used == bytes.size()) bytes.resize(bytes.size() + std::max(kChunk, bytes.size() / 2));
     const ssize_t got = ::read(input.number(), bytes.data() + used, bytes.size() - used);
     if (got < 0 && errno == EINTR) continue;
-    if (got < 0) fail(file, "cannot be read: " + system_message(errno));
+    if (got < 0) fail(file, "cannot be read", errno);
     if (got == 0) break;
     used += static_cast<std::size_t>(got);
   }
@@ -179,8 +184,7 @@ void write_to_standard_output(std::string_view bytes) {
     const ssize_t put = ::write(STDOUT_FILENO, bytes.data(), bytes.size());
     if (put < 0 && errno == EINTR) continue;
     if (put < 0 && errno == EPIPE) return;  // `cairn … | head`: its reader has enough
-    if (put < 0)
-      throw Error(ErrorCode::input, "standard output cannot be written: " + system_message(errno));
+    if (put < 0) fail("standard output", "cannot be written", errno);
     bytes.remove_prefix(static_cast<std::size_t>(put));
   }
 }

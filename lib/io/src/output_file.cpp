@@ -17,6 +17,7 @@
 
 #include <fmt/core.h>
 
+#include "cairn/io/file_error.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/runtime/error.hpp"
 
@@ -31,8 +32,9 @@ constexpr int kPause = 20;  // [ms] between looks for an interrupt, while a read
 
 std::string system_message(int number) { return std::generic_category().message(number); }
 
-[[noreturn]] void refuse(const fs::path& file, const std::string& what) {
-  throw Error(ErrorCode::input, fmt::format("{}: {}", file.string(), what));
+/// `number`: the system's errno, or that which fits.
+[[noreturn]] void refuse(const fs::path& file, const std::string& what, int number) {
+  throw FileError(fmt::format("{}: {}", file.string(), what), file, number);
 }
 
 /// Calls again what a signal has interrupted.
@@ -137,7 +139,7 @@ OutputFile::OutputFile(const fs::path& file) : file_(file) {
   target_ = std::move(target.file);
   struct stat status {};
   const bool exists = ::stat(target_.c_str(), &status) == 0;
-  if (exists && S_ISDIR(status.st_mode)) refuse(file_, "is a folder; expected a file name");
+  if (exists && S_ISDIR(status.st_mode)) refuse(file_, "is a folder; expected a file name", EISDIR);
   if (exists && !S_ISREG(status.st_mode)) {
     // Renaming a file over these would remove them.
     if (S_ISFIFO(status.st_mode)) {
@@ -176,7 +178,7 @@ void OutputFile::open_fifo() {
   const auto open = [&] { return ::open(target_.c_str(), O_WRONLY | O_CLOEXEC | O_NONBLOCK); };
   while ((descriptor_ = without_interrupts(open)) < 0) {
     if (errno != ENXIO) fail(errno);
-    if (is_interrupted()) refuse(file_, "interrupted before anything reads it");
+    if (is_interrupted()) refuse(file_, "interrupted before anything reads it", EINTR);
     static_cast<void>(::poll(nullptr, 0, kPause));
   }
 }
@@ -241,7 +243,7 @@ void OutputFile::finish() {
 
 void OutputFile::fail(int reason) const {
   empty_unfinished(beside_);
-  refuse(file_, "cannot be written: " + system_message(reason));
+  refuse(file_, "cannot be written: " + system_message(reason), reason);
 }
 
 void end_waiting_for_readers_on(const std::atomic<bool>* interrupt) noexcept {
@@ -262,15 +264,18 @@ void check_writable(const fs::path& file) {
   if (descriptor) return static_cast<void>(OutputFile(file));
   struct stat status {};
   const bool exists = ::stat(target.c_str(), &status) == 0;
-  if (exists && S_ISDIR(status.st_mode)) refuse(file, "is a folder; expected a file name");
+  if (exists && S_ISDIR(status.st_mode)) refuse(file, "is a folder; expected a file name", EISDIR);
   if (exists && !S_ISREG(status.st_mode)) return;
   const fs::path folder = target.has_parent_path() ? target.parent_path() : ".";
   if (::access(folder.c_str(), W_OK | X_OK) != 0) {
+    const int reason = errno;
     refuse(file,
-           fmt::format("cannot be written: folder {}: {}", folder.string(), system_message(errno)));
+           fmt::format("cannot be written: folder {}: {}", folder.string(), system_message(reason)),
+           reason);
   }
   if (exists) {
-    if (const std::string why = why_not_replaced(target, folder); !why.empty()) refuse(file, why);
+    if (const std::string why = why_not_replaced(target, folder); !why.empty())
+      refuse(file, why, EACCES);
   }
   const OutputFile attempt(file);
 }
