@@ -225,24 +225,14 @@ void suggest_scale(const TrajectoryPairs& pairs, const EvaluateOptions& options,
                   fmt::format("{:.6g}", *scale), scaled.ate_translation, error.ate_translation));
 }
 
-/// Orientations that are off by about the 120° between a camera's axes and a robot's, and agree
-/// when one of the two trajectories is turned.
 void suggest_axes(const TrajectoryPairs& pairs, const EvaluateOptions& options,
                   const TrajectoryError& error, const Session& session) {
-  constexpr double kFar = 90.0, kShare = 0.1;  // [deg], of the error
-  if (error.ate_rotation < kFar || options.planar) return;
-  for (const bool of_estimate : {true, false}) {
-    if ((of_estimate ? options.estimate : options.truth).axes == "camera") continue;
-    TrajectoryPairs turned = pairs;
-    Trajectory& poses = of_estimate ? turned.estimate : turned.truth;
-    poses = camera_to_robot_axes(std::move(poses));
-    const double left = rotation_error(turned);
-    if (left > kShare * error.ate_rotation) continue;
-    session.note(
-        fmt::format("with {} camera the ATE in rotation is {:.6g} deg instead of {:.6g} "
-                    "deg: one of the two is in the axes of a camera, the other of a robot",
-                    of_estimate ? "--axes" : "--truth-axes", left, error.ate_rotation));
-    return;
+  if (options.planar) return;
+  if (const auto axes = camera_axes_of_one(pairs, error.ate_rotation)) {
+    session.note(fmt::format(
+        "with {} camera the ATE in rotation is {:.6g} deg instead of {:.6g} "
+        "deg: one of the two is in the axes of a camera, the other of a robot",
+        axes->of_estimate ? "--axes" : "--truth-axes", axes->ate_rotation, error.ate_rotation));
   }
 }
 

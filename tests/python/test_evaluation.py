@@ -56,6 +56,19 @@ def test_files_with_time_stamps_are_paired_by_time(tmp_path):
         cairn.evaluate(estimate, truth, match="time")
 
 
+def test_a_trajectory_in_the_axes_of_a_camera_is_warned_of(tmp_path):
+    robot, _ = cairn.generate("sphere", seed=1, turns=3, poses_per_turn=10)
+    robot.write(tmp_path / "robot.kitti", format="kitti")
+    given = cairn.read(tmp_path / "robot.kitti", format="kitti")
+    camera = cairn.read(tmp_path / "robot.kitti", format="kitti", axes="camera")
+    for pair, which in (((given, camera), "estimate"), ((camera, given), "truth")):
+        with pytest.warns(UserWarning, match=f"axes='camera' for cairn.read of the {which} the ATE in rotation is"):
+            cairn.evaluate(*pair)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        cairn.evaluate(given, given)
+
+
 def test_a_planar_estimate_beside_a_spatial_truth_is_warned_of():
     truth = cairn.Graph()
     height = np.array([0.0, 0.4, 0.1])  # of three poses on a line, level

@@ -81,6 +81,16 @@ void suggest_scale(const TrajectoryPairs& pairs) {
                   *scale));
 }
 
+void suggest_axes(const TrajectoryPairs& pairs, const TrajectoryError& error) {
+  if (const auto axes = camera_axes_of_one(pairs, error.ate_rotation)) {
+    warn(fmt::format(
+        "with axes='camera' for cairn.read of the {} the ATE in rotation is {:.6g} deg "
+        "instead of {:.6g} deg: one of the two is in the axes of a camera, the other "
+        "of a robot",
+        axes->of_estimate ? "estimate" : "truth", axes->ate_rotation, error.ate_rotation));
+  }
+}
+
 TrajectoryError evaluate(BoundGraph& estimate, BoundGraph& truth, const std::string& match,
                          bool planar, bool align_scale) {
   Trajectory poses = trajectory_of(estimate.get(), estimate.stamps);
@@ -95,8 +105,12 @@ TrajectoryError evaluate(BoundGraph& estimate, BoundGraph& truth, const std::str
       stamps ? pair_by_stamp(poses, true_poses) : pair_by_id(poses, true_poses);
   if (!stamps && match != "id") judge_rows(pairs, estimate.row_ids, truth.row_ids);
   if (!align_scale) suggest_scale(pairs);
-  const py::gil_scoped_release unlocked;
-  return compare(pairs, align_scale ? Alignment::similarity : Alignment::rigid);
+  const TrajectoryError error = [&] {
+    const py::gil_scoped_release unlocked;
+    return compare(pairs, align_scale ? Alignment::similarity : Alignment::rigid);
+  }();
+  if (!planar) suggest_axes(pairs, error);
+  return error;
 }
 
 }  // namespace
@@ -134,7 +148,8 @@ has no ids, they are its row numbers: an Error where the other has ids, one of t
 partner; match="id" compares by row all the same.
 align_scale: aligns with a scale, too, which the estimate of a single camera lacks (`TrajectoryError.scale`), for all errors
 alike. Without it a UserWarning says where a scale explains most of the error.
-planar: compares x, y and yaw alone. Without it a UserWarning says where one of the two is of the plane and the other not.)");
+planar: compares x, y and yaw alone. Without it a UserWarning says where one of the two is of the plane and the other not,
+and where one is in the axes of a camera (axes of `cairn.read`) and the other of a robot.)");
 }
 
 }  // namespace cairn::python

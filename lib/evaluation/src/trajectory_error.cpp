@@ -6,6 +6,7 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <utility>
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -348,9 +349,27 @@ TrajectoryError compare(const Trajectory& estimate, const Trajectory& truth) {
   return compare(pair_by_id(estimate, truth));
 }
 
+namespace {
+
+/// `TrajectoryError::ate_rotation` alone [deg].
 double rotation_error(const TrajectoryPairs& poses) {
   const Pairs pairs = pairs_of(poses);
   return kDegrees * std::sqrt(absolute_errors(pairs).rotation / static_cast<double>(pairs.size()));
+}
+
+}  // namespace
+
+std::optional<CameraAxes> camera_axes_of_one(const TrajectoryPairs& pairs, double ate_rotation) {
+  constexpr double kFar = 90.0, kShare = 0.1;  // [deg], of the error
+  if (ate_rotation < kFar) return std::nullopt;
+  for (const bool of_estimate : {true, false}) {
+    TrajectoryPairs turned = pairs;
+    Trajectory& poses = of_estimate ? turned.estimate : turned.truth;
+    poses = camera_to_robot_axes(std::move(poses));
+    const double left = rotation_error(turned);
+    if (left <= kShare * ate_rotation) return CameraAxes{of_estimate, left};
+  }
+  return std::nullopt;
 }
 
 double absolute_error(const Trajectory& estimate, const Trajectory& truth) {

@@ -137,9 +137,16 @@ CAIRN_API double aligning_scale(const TrajectoryPairs& pairs);
 /// a scale leaves more than half in most cases.
 CAIRN_API std::optional<double> explaining_scale(const TrajectoryPairs& pairs);
 
-/// How far the orientations are from those of the truth after `align` [deg], a root mean square:
-/// `TrajectoryError::ate_rotation` alone, in linear time.
-CAIRN_API double rotation_error(const TrajectoryPairs& pairs);
+/// One of two trajectories in the axes of a camera, where the other is in those of a robot.
+struct CameraAxes {
+  bool of_estimate = false;   ///< else of the truth
+  double ate_rotation = 0.0;  ///< with that one turned (`camera_to_robot_axes`) [deg]
+};
+
+/// Where orientations are off by about the 120° between a camera's axes and a robot's
+/// (`ate_rotation` [deg], of `pairs`), and agree when one of the two is turned. In linear time.
+CAIRN_API std::optional<CameraAxes> camera_axes_of_one(const TrajectoryPairs& pairs,
+                                                       double ate_rotation);
 
 /// Compares poses after `align`, or after scaling the estimate and then `align`, for all errors
 /// alike. All-to-all errors go over all n(n-1)/2 pairs of instants.
