@@ -81,6 +81,13 @@ def test_rotations_come_in_all_forms():
     assert_allclose(yaw.matrix()[:2, :2], dense.rotation(2.0), atol=1e-14)
 
 
+def test_a_rotation_turns_a_point():
+    R = cairn.Rot3.from_roll_pitch_yaw(0.1, -0.4, 2.0)
+    turned = R * cairn.Point3(1, 2, 3)
+    assert isinstance(turned, cairn.Point3)
+    assert_allclose(turned.state, R.matrix() @ [1, 2, 3], atol=1e-14)
+
+
 def test_points_are_transformed_one_by_one_and_in_rows():
     pose = some_pose3(6)
     points = np.random.default_rng(0).normal(size=(5, 3))

@@ -246,6 +246,9 @@ void bind_space(py::module_& module) {
           "roll_pitch_yaw", [](const Rot3& R) { return array_of_vector(R.roll_pitch_yaw()); },
           "[rad], pitch within -pi/2 and pi/2.");
   bind_group<Rot3>(rotation);
+  rotation.def(
+      "__mul__", [](const Rot3& R, const Point3& p) { return R * p; }, py::is_operator(),
+      "R p: a point, or a direction, turned.");
 
   py::class_<Pose3> pose(module, "Pose3",
                          R"(A pose in space: x y z [m] and a rotation; VERTEX_SE3:QUAT in files.
