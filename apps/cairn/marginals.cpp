@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -86,9 +87,16 @@ int variable_of(const std::string& text, const Graph& graph, const char* option)
                             option, text));
   }
   if (const std::optional<int> found = graph.find(*id)) return *found;
-  throw Error(
-      ErrorCode::input,
-      fmt::format("{}: the graph has no variable {}; cairn info shows its ids", option, text));
+  Id first = std::numeric_limits<Id>::max(), last = 0;
+  for (int v = 0; v < graph.variable_count(); ++v) {
+    first = std::min(first, graph.id(v));
+    last = std::max(last, graph.id(v));
+  }
+  throw Error(ErrorCode::input,
+              fmt::format("{}: the graph has no variable {}; the ids of its {} are between {} and "
+                          "{}",
+                          option, text, plural(graph.variable_count(), "variable"), id_text(first),
+                          id_text(last)));
 }
 
 std::pair<int, int> pair_of(const std::string& text, const Graph& graph) {
@@ -514,7 +522,10 @@ int run(MarginalsOptions options, Session& session) {
   }
   const std::optional<Summary> summary =
       optimize(loaded.graph, optimizer.get(), setup, options, *guard, session);
-  if (guard->interrupted()) return kExitInterrupted;
+  if (guard->interrupted()) {
+    session.note("interrupted before any covariance was computed: nothing is written");
+    return kExitInterrupted;
+  }
   guard.reset();  // what follows has nothing to write before its end
   const Answer answer =
       call_plugin([&] { return fmt::format("linear solver '{}'", options.linear_solver); },

@@ -236,7 +236,7 @@ TEST_F(MarginalsCommand, SaysWhichSetsAreNone) {
   refusal("3+:5", 2, "'' is not an id");
   refusal("3:3", 2, "names 3 twice");
   refusal("3+4:5+4", 2, "names 4 twice");
-  refusal("3:4711", 3, "no variable 4711");
+  refusal("3:4711", 3, "no variable 4711; the ids of its ");
   const Outcome file_of_none =
       cairn({"marginals", file, "--mutual-information", "3:5", "-o", folder_.file("none.cov")});
   EXPECT_EQ(file_of_none.exit_code, 2);
