@@ -2,9 +2,11 @@
 #include "command_line.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -44,6 +46,42 @@ void add_common_options(ProgramParser& program, CommonOptions& common) {
                "no progress, and no notes but those that stand in results");
   program.add_config("--config", "TOML: options above at the top, [optimize] for a command's own")
       .type_name("FILE");
+}
+
+/// A command, and what adds it with its options.
+struct NamedCommand {
+  std::string_view name;
+  Command (*add)(ArgumentParser program);
+};
+
+constexpr std::array kCommands{NamedCommand{"info", add_info},
+                               NamedCommand{"optimize", add_optimize},
+                               NamedCommand{"bench", add_bench},
+                               NamedCommand{"replay", add_replay},
+                               NamedCommand{"online", add_online},
+                               NamedCommand{"marginals", add_marginals},
+                               NamedCommand{"compact", add_compact},
+                               NamedCommand{"sparsify", add_sparsify},
+                               NamedCommand{"evaluate", add_evaluate},
+                               NamedCommand{"view", add_view},
+                               NamedCommand{"plot", add_plot},
+                               NamedCommand{"convert", add_convert},
+                               NamedCommand{"generate", add_generate},
+                               NamedCommand{"explore", add_explore},
+                               NamedCommand{"map", add_map},
+                               NamedCommand{"plugins", add_plugins},
+                               NamedCommand{"new-plugin", add_new_plugin},
+                               NamedCommand{"study", add_study}};
+
+/// The commands that are needed to understand a line: the one that it begins with, or all. To build
+/// the options of all takes longer than to read a small graph.
+std::span<const NamedCommand> needed_commands(std::span<const char* const> words) {
+  const std::span<const NamedCommand> all(kCommands);
+  if (words.size() == 1 && words.front() == std::string_view("--version")) return {};
+  const auto is_config = [](std::string_view word) { return word.starts_with("--config"); };
+  if (words.empty() || std::ranges::any_of(words, is_config)) return all;  // with sections for any
+  const auto first = std::ranges::find(all, std::string_view(words.front()), &NamedCommand::name);
+  return first == all.end() ? all : all.subspan(static_cast<std::size_t>(first - all.begin()), 1);
 }
 
 /// "--iterations" of "--iterations=5".
@@ -192,8 +230,9 @@ int print_usage_of_nothing(const ArgumentParser& program) {
 
 }  // namespace
 
-CommandLine::CommandLine(Session& session)
+CommandLine::CommandLine(Session& session, std::span<const char* const> words)
     : session_(session),
+      words_(words),
       program_("cairn",
                "cairn: optimises factor graphs (graph SLAM); everything in it is chosen by name"),
       help_(program_.root()),
@@ -206,11 +245,8 @@ CommandLine::CommandLine(Session& session)
       "Example:\n"
       "  cairn generate sphere -o sphere.g2o && cairn optimize sphere.g2o -o best.g2o\n"
       "  cairn bench sphere.g2o --linear-solver block_cholesky,cholmod,eigen");
-  commands_ = {add_info(cli),       add_optimize(cli),  add_bench(cli),   add_replay(cli),
-               add_online(cli),     add_marginals(cli), add_compact(cli), add_sparsify(cli),
-               add_evaluate(cli),   add_view(cli),      add_plot(cli),    add_convert(cli),
-               add_generate(cli),   add_explore(cli),   add_map(cli),     add_plugins(cli),
-               add_new_plugin(cli), add_study(cli)};
+  for (const NamedCommand& command : needed_commands(words.subspan(1)))
+    commands_.push_back(command.add(cli));
   help_ = cli.add_command("help", "this text, or that of a command");
   help_.add_option("command", help_options_.command, "the command that is to be explained")
       .type_name("COMMAND")
@@ -265,13 +301,15 @@ int CommandLine::complete(const std::vector<std::string>& words) {
   return 0;
 }
 
-std::function<int()> CommandLine::parse(int argc, const char* const* argv) {
+std::function<int()> CommandLine::parse() {
   // Words that are being typed are not parsed: they may be options, or empty.
-  if (argc > 2 && argv[1] == std::string_view("complete") && argv[2] == std::string_view("--")) {
-    return
-        [this, words = std::vector<std::string>(argv + 3, argv + argc)] { return complete(words); };
+  if (words_.size() > 2 && words_[1] == std::string_view("complete") &&
+      words_[2] == std::string_view("--")) {
+    return [this, words = std::vector<std::string>(words_.begin() + 3, words_.end())] {
+      return complete(words);
+    };
   }
-  const ParseOutcome outcome = program_.parse(argc, argv);
+  const ParseOutcome outcome = program_.parse(static_cast<int>(words_.size()), words_.data());
   ArgumentParser program = program_.root();
   const std::optional<ArgumentParser> chosen = program_.chosen();
   switch (outcome.kind) {

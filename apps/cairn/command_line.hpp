@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -17,14 +18,15 @@ struct HelpOptions {
   std::string man_pages;  ///< folder, or empty
 };
 
-/// The whole command line: the program, its subcommands and their options.
+/// The command line: the program, its subcommands and their options.
 class CommandLine {
  public:
-  explicit CommandLine(Session& session);
+  /// `words`: the program's name, and what was typed after it; they outlive this.
+  CommandLine(Session& session, std::span<const char* const> words);
 
   /// Parses, and returns what to run. Help and version are a run too. Throws `Error` (usage) for
   /// what cannot be understood, with the nearest spelling.
-  std::function<int()> parse(int argc, const char* const* argv);
+  std::function<int()> parse();
 
  private:
   /// What `cairn help` and `cairn help COMMAND` do.
@@ -35,9 +37,10 @@ class CommandLine {
   int complete(const std::vector<std::string>& words);
 
   Session& session_;
+  std::span<const char* const> words_;
   ProgramParser program_;
-  std::vector<Command> commands_;
-  ArgumentParser help_;  // of the command `help`
+  std::vector<Command> commands_;  // those that the words may mean
+  ArgumentParser help_;            // of the command `help`
   HelpOptions help_options_;
   ArgumentParser complete_;  // of the command `complete`
   std::vector<std::string> words_to_complete_;

@@ -76,10 +76,10 @@ void print_no_thread(const char* why) noexcept {
   std::fprintf(stderr, "cairn: a thread cannot be started (%s); give fewer with --threads\n", why);
 }
 
-int run(int argc, const char* const* argv) {
+int run(std::span<const char* const> words) {
   cairn::app::Session session;
-  cairn::app::CommandLine line(session);
-  const std::function<int()> command = line.parse(argc, argv);
+  cairn::app::CommandLine line(session, words);
+  const std::function<int()> command = line.parse();
   if (session.common.json != "-") cairn::app::check_file(session.common.json, session);
   return command();
 }
@@ -183,7 +183,7 @@ int main(int argc, char** argv) {
   std::signal(SIGPIPE, SIG_IGN);  // `cairn … | head` is no reason to die before files are written
   std::signal(SIGXFSZ, SIG_IGN);  // the limit of a file's size is an error of its output
   try {
-    leave(run(argc, argv));
+    leave(run({argv, static_cast<std::size_t>(argc)}));
   } catch (const cairn::Error& error) {
     print_error(error.what());
     leave(static_cast<int>(error.code()));

@@ -187,6 +187,14 @@ TEST(Usage, QuietLeavesStandardErrorEmpty) {
   }
 }
 
+TEST(Usage, OptionsOfEveryCommandMayStandBeforeIt) {
+  const Outcome after = cairn({"info", "@ring:poses=40", "--threads", "1"});
+  const Outcome before = cairn({"--threads", "1", "info", "@ring:poses=40"});
+  EXPECT_EQ(before.exit_code, 0) << before.err;
+  EXPECT_EQ(before.out, after.out);
+  expect_error(cairn({"--threads", "1", "inof", "@ring"}), kUsage, "did you mean 'info'?");
+}
+
 TEST(Usage, AConfigurationFileStandsBehindTheCommandLine) {
   const TemporaryFolder folder;
   write_text(folder.file("run.toml"),
@@ -210,6 +218,7 @@ TEST(Usage, AConfigurationFileWithUnknownKeysIsRefused) {
     return cairn({"optimize", "@ring", "--config", folder.file("run.toml")});
   };
   expect_error(with("[optimize]\niteratons = 2\n"), kUsage, "did you mean '--iterations'?");
+  expect_error(with("[bench]\nrepet = 2\n"), kUsage, "did you mean '--repeat'?");
   expect_error(with("iterations = 2\n"), kUsage, "'iterations'");
   expect_error(with("[optimise]\niterations = 2\n"), kUsage, "'optimise'");
   write_text(folder.file("again.toml"), "config = \"run.toml\"\n");
