@@ -74,11 +74,16 @@ std::string on_offer(const char* what, const std::vector<std::string>& names,
                        : fmt::format("{} on offer: {}", what, fmt::join(names, ", "));
 }
 
-/// Chooses by content; where two are equally sure, the file's ending decides.
+/// Chooses by content; where two are equally sure, the file's ending decides. Those with the ending
+/// are asked first: if one is certain, no other can be chosen, and none looks at the text again.
 NamedFormat detect(const std::filesystem::path& file, std::string_view text, Registry& registry) {
+  constexpr std::pair<int, bool> kCertain{100, true};
   std::vector<std::string> problems;
   std::vector<NamedFormat> formats = all_formats(registry, problems);
   const std::string wanted = file_ending(file);
+  std::stable_partition(formats.begin(), formats.end(), [&](const NamedFormat& candidate) {
+    return has_ending(*candidate.format, wanted);
+  });
   std::pair<int, bool> best{0, false};
   NamedFormat* chosen = nullptr;
   for (NamedFormat& candidate : formats) {
@@ -89,6 +94,7 @@ NamedFormat detect(const std::filesystem::path& file, std::string_view text, Reg
       best = score;
       chosen = &candidate;
     }
+    if (best >= kCertain) break;
   }
   if (!chosen) {
     std::vector<std::string> readers;
