@@ -662,9 +662,8 @@ std::vector<bool> determined_by_whole_relative_poses(const Graph& graph,
   return determined;
 }
 
-/// Whether all factors are fully measured relative poses without a loss, and every component has a
-/// constant variable: then nothing is free, as in most graphs of poses.
-bool all_are_whole_relative_poses(const Graph& graph, const Gauge& gauge) {
+/// Whether all factors are fully measured relative poses without a loss.
+bool all_are_whole_relative_poses(const Graph& graph) {
   if (graph.has_losses()) return false;
   for (const FactorPool& pool : graph.factor_pools()) {
     const int n = pool.type->residual_size();
@@ -672,6 +671,13 @@ bool all_are_whole_relative_poses(const Graph& graph, const Gauge& gauge) {
                             std::ranges::any_of(pool.ranks, [n](int rank) { return rank < n; })))
       return false;
   }
+  return true;
+}
+
+/// And whether every component has a constant variable: then nothing is free, as in most graphs of
+/// poses.
+bool all_are_whole_relative_poses(const Graph& graph, const Gauge& gauge) {
+  if (!all_are_whole_relative_poses(graph)) return false;
   std::vector<bool> has_constant(static_cast<std::size_t>(gauge.components), false);
   for (std::size_t v = 0; v < gauge.held.size(); ++v)
     if (gauge.held[v]) has_constant[static_cast<std::size_t>(gauge.component[v])] = true;
@@ -740,6 +746,8 @@ FreeDirections find_free_directions(const Graph& graph, const Gauge& gauge, cons
 }
 
 FreeDirections find_free_directions(const Graph& graph) {
+  // Of relative poses alone the gauge holds one in every component.
+  if (all_are_whole_relative_poses(graph)) return {};
   return find_free_directions(graph, resolve_gauge(graph), graph.values());
 }
 
