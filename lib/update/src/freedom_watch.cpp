@@ -2,6 +2,7 @@
 #include "cairn/update/freedom_watch.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <numeric>
 
 namespace cairn {
@@ -71,6 +72,25 @@ FreeDirections search(const SomeRows& rows, const FreedomWatch::System& system, 
   return found;
 }
 
+/// Whether each of the new factors that is on unknown variables determines them from known ones, in
+/// the order of the factors: what most updates bring, without a search.
+template <class Known>
+bool follows_in_order(const FreedomWatch::System& system, int first, const Known& known) {
+  std::vector<int> reached;
+  const auto unknown = [&](int v) {
+    return !known(v) && std::ranges::find(reached, v) == reached.end();
+  };
+  for (int f = first; f < system.graph.factor_count(); ++f) {
+    if (!system.live(f)) continue;
+    const auto on = system.graph.factor_variables(f);
+    const auto count = std::ranges::count_if(on, unknown);
+    if (count == 0) continue;
+    if (count == std::ssize(on) || !determines_each(system.graph, f)) return false;
+    std::ranges::copy_if(on, std::back_inserter(reached), unknown);
+  }
+  return true;
+}
+
 }  // namespace
 
 const FreeDirections& FreedomWatch::look(const System& system) {
@@ -88,19 +108,30 @@ bool FreedomWatch::only_added(const System& system) const {
 }
 
 bool FreedomWatch::look_at_new(const System& system) {
-  std::vector<int> factors;
-  for (int f = factors_; f < system.graph.factor_count(); ++f)
-    if (system.live(f)) factors.push_back(f);
-  const std::size_t count = factors.size();
-  const SomeRows rows(system, std::move(factors));
   const auto is_new = [&](int v) { return v >= variables_ || idle_.contains(v); };
-  FreeDirections found =
-      search(rows, system, count, [&](int v) { return system.held(v) || !is_new(v); });
-  if (!found.complete || !found.empty()) return false;
-  for (const int v : rows.graph_variables())
-    if (is_new(v) && system.held(v) && !system.graph.fixed(v)) anchors_.push_back(v);
+  const auto known = [&](int v) { return !is_new(v) || system.held(v); };
+  const auto for_each = [&](const auto& what) {
+    for (int f = factors_; f < system.graph.factor_count(); ++f)
+      if (system.live(f)) what(f);
+  };
+  if (!follows_in_order(system, factors_, known)) {
+    std::vector<int> factors;
+    for_each([&](int f) { factors.push_back(f); });
+    const std::size_t count = factors.size();
+    const FreeDirections found = search(SomeRows(system, std::move(factors)), system, count, known);
+    if (!found.complete || !found.empty()) return false;
+  }
+  for_each([&](int f) {
+    for (const int v : system.graph.factor_variables(f)) {
+      if (is_new(v) && system.held(v) && !system.graph.fixed(v) &&
+          std::ranges::find(anchors_, v) == anchors_.end())
+        anchors_.push_back(v);
+    }
+  });
   for (int v = variables_; v < system.graph.variable_count(); ++v) idle_.insert(idle_.end(), v);
-  for (const int v : rows.graph_variables()) idle_.erase(v);
+  for_each([&](int f) {
+    for (const int v : system.graph.factor_variables(f)) idle_.erase(v);
+  });
   variables_ = system.graph.variable_count();
   factors_ = system.graph.factor_count();
   return true;
