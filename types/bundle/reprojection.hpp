@@ -40,15 +40,14 @@ struct Reprojection {
   template <class S>
   static bool in_plane(const Vector<S, 3>& P) {
     using std::abs;
-    const S z = abs(P[2]), aside = abs(P[0]) + abs(P[1]);
-    return z < aside * kLeastDepth || z < kCentre;
+    return abs(P[2]) < (abs(P[0]) + abs(P[1])) * kLeastDepth + kCentre;
   }
 
   /// −1 / P_z; in the plane of the camera, on the tangent of that, and 0 in its centre.
   template <class S>
-  static S inverse_depth(const Vector<S, 3>& P) {
+  static S inverse_depth(const Vector<S, 3>& P, bool is_in_plane) {
     using std::abs;
-    if (!in_plane<S>(P)) [[likely]]
+    if (!is_in_plane) [[likely]]
       return -1.0 / P[2];
     const S least = (abs(P[0]) + abs(P[1])) * kLeastDepth;
     if (least < kCentre) return S(0.0);
@@ -83,7 +82,7 @@ struct Reprojection {
     const Vector<S, 7> pose = Camera::pose<S>(camera);
     const Vector<S, 3> apart = point - Se3::translation<S>(pose);
     const Vector<S, 3> P = so3::rotate_back<S>(Se3::quaternion<S>(pose), apart);
-    const S inverse = inverse_depth<S>(P);
+    const S inverse = inverse_depth<S>(P, in_plane<S>(P));
     const S x = P[0] * inverse, y = P[1] * inverse;
     const Distortion<S> lens(x * x + y * y, camera[1], camera[2]);
     const S scale = camera[0] * lens.s;
@@ -100,7 +99,8 @@ struct Reprojection {
     const so3::Matrix3<S> R = so3::matrix<S>(Se3::quaternion<S>(pose));  // from camera to world
     const Vector<S, 3> apart = point - Se3::translation<S>(pose);
     const Vector<S, 3> P = so3::times<S>(so3::Matrix3<S>(R.transpose()), apart);
-    const S d = inverse_depth<S>(P);
+    const bool is_in_plane = in_plane<S>(P);
+    const S d = inverse_depth<S>(P, is_in_plane);
     const S x = P[0] * d, y = P[1] * d;
     const S f = camera[0];
     const S n = x * x + y * y;
@@ -112,7 +112,7 @@ struct Reprojection {
     Eigen::Matrix<S, 2, 3> D;                 // d error / dP
     D << f * d * (s + slope * x * x), f * d * slope * x * y, along * x,  //
         f * d * slope * x * y, f * d * (s + slope * y * y), along * y;
-    if (in_plane<S>(P)) [[unlikely]]
+    if (is_in_plane) [[unlikely]]
       D = in_plane_jacobian<S>(P, f, d);
     for (int row = 0; row < 2; ++row) {
       for (int c = 0; c < 3; ++c)  // D Rᵀ
