@@ -63,18 +63,19 @@ class Placer {
       : update_(update), state_of_(state_of) {
     for (std::size_t k = 0; k < update.variables.size(); ++k) {
       if (update.variables[k].type) new_.emplace(update.variables[k].id, static_cast<int>(k));
+      unplaced_ += update.variables[k].state.empty();
     }
   }
 
   std::vector<int> run() {
-    for (bool again = unplaced() > 0; again;) {
+    for (bool again = true; again && unplaced_ > 0;) {
       again = false;
-      for (const Factor& factor : update_.factors) again = place_by(factor) || again;
+      for (const Factor& factor : update_.factors)
+        again = (unplaced_ > 0 && place_by(factor)) || again;
       // Only where no factor determines all of one: by one that determines it in part.
       again = again || std::ranges::any_of(update_.factors, [this](const Factor& factor) {
                 return place_in_part_by(factor);
               });
-      again = again && unplaced() > 0;
     }
     std::vector<int> left;
     for (std::size_t k = 0; k < update_.variables.size(); ++k) {
@@ -84,11 +85,6 @@ class Placer {
   }
 
  private:
-  std::ptrdiff_t unplaced() const {
-    return std::ranges::count_if(update_.variables,
-                                 [](const Variable& v) { return v.state.empty(); });
-  }
-
   std::span<const double> state(Id id) const {
     const auto it = new_.find(id);
     if (it != new_.end()) return update_.variables[it->second].state;
@@ -110,8 +106,7 @@ class Placer {
         factor.information.size() != packed_size(factor.type->residual_size()))
       return {};
     Measured one;
-    one.z = factor.measurement;
-    one.root = factor.information;
+    one.x.reserve(factor.variables.size());
     for (std::size_t k = 0; k < factor.variables.size(); ++k) {
       const std::span<const double> at = state(factor.variables[k]);
       one.x.push_back(at.data());
@@ -127,6 +122,8 @@ class Placer {
     const auto it = new_.find(factor.variables[one.target]);
     if (it == new_.end()) return {};
     Variable& variable = update_.variables[it->second];
+    one.z = factor.measurement;
+    one.root = factor.information;
     if (variable.type->tag() == factor.type->variable_tags()[one.target] &&
         factor.type->normalize(one.z.data()).empty() &&
         square_root(factor.information, factor.type->residual_size(), one.root))
@@ -175,17 +172,19 @@ class Placer {
     variable.type->identity(state.data());
     return state;
   }
-  static bool take(Variable& variable, std::vector<double> placed) {
+  bool take(Variable& variable, std::vector<double> placed) {
     if (!std::ranges::all_of(placed, [](double v) { return std::isfinite(v); }) ||
         !variable.type->normalize(placed.data()).empty())
       return false;
     variable.state = std::move(placed);
+    --unplaced_;
     return true;
   }
 
   GraphUpdate& update_;
   const std::function<std::span<const double>(Id)>& state_of_;
   std::unordered_map<Id, int> new_;
+  int unplaced_ = 0;  // variables without a state
 };
 
 }  // namespace
