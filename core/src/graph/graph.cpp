@@ -204,16 +204,20 @@ void Graph::check_ends(const FactorType& type, std::span<const int> variables) c
     throw bad_input(
         fmt::format("{} joins {} variables, not {}", type.tag(), arity, variables.size()));
   const auto name = [&] { return name_of(type, variables); };
+  const auto pool = std::ranges::find_if(
+      factor_pools_, [&](const FactorPool& each) { return each.type.get() == &type; });
   for (int k = 0; k < arity; ++k) {
     const int v = variables[k];
     if (v < 0 || v >= variable_count())
       throw bad_input(fmt::format("{}: there is no such variable", name()));
-    if (this->type(v).tag() != type.variable_tags()[k]) {
+    // The variable's type fits where it is that of the factors of this type before.
+    const bool fits = pool != factor_pools_.end() && records_[v].pool == pool->variable_pools[k];
+    if (!fits && this->type(v).tag() != type.variable_tags()[k]) {
       throw bad_input(fmt::format("{}: variable {} is a {}, expected a {}", name(), id_text(id(v)),
                                   this->type(v).tag(), type.variable_tags()[k]));
     }
-    if (this->type(v).ambient_size() != type.ambient_size(k) ||
-        this->type(v).tangent_size() != type.tangent_size(k)) {
+    if (!fits && (this->type(v).ambient_size() != type.ambient_size(k) ||
+                  this->type(v).tangent_size() != type.tangent_size(k))) {
       throw Error(ErrorCode::plugin,
                   fmt::format("{}: the factor type and the variable type {} disagree about the "
                               "variable's sizes",
@@ -263,7 +267,8 @@ int Graph::add_factor(std::shared_ptr<const FactorType> type, std::span<const in
   }
   if (!problem.empty()) throw bad_input(fmt::format("{}: {}", name_of(*type, variables), problem));
   const int rank = noise < 0 ? root.rank : factor_pools_[p].ranks[noise];
-  const std::int16_t of_loss = loss_index(*type, for_size(std::move(loss), rank));
+  if (loss) loss = for_size(std::move(loss), rank);
+  const std::int16_t of_loss = loss_index(*type, loss);
   // Nothing is refused from here on.
   if (!has_pool) {
     factor_pools_.emplace_back().type = std::move(type);
