@@ -31,13 +31,11 @@ struct Votes {
 /// observations, then a line of four fields for each observation, and one number a line.
 class BalVotes {
  public:
-  void vote(Scanner& scanner) {
-    if (line_++ > 0 && !is_header_) return;
-    scanner.expect_row({}, "");
-    const int fields = scanner.count_fields();
-    if (line_ == 1) {
+  /// `fields`: of this line, all.
+  void vote(Scanner& scanner, int fields) {
+    if (++line_ == 1) {
       is_header_ = fields == 3 && read_header(scanner);
-    } else {
+    } else if (is_header_) {
       fitting_ += fields == (line_ - 1 <= observations_ ? 4 : 1);
     }
   }
@@ -47,6 +45,7 @@ class BalVotes {
 
  private:
   bool read_header(Scanner& scanner) {
+    scanner.expect_row({}, "");
     try {
       const std::int64_t cameras = scanner.read_count(), points = scanner.read_count();
       observations_ = scanner.read_count();
@@ -115,12 +114,11 @@ void vote_on_landmark(Scanner& scanner, Votes& votes) {
   ++(fields == 7 ? votes.isam : fields == 11 ? votes.toro : votes.toro_or_isam);
 }
 
-void vote(Scanner& scanner, Votes& votes) {
+/// `fields`: of a line that begins with no word.
+void vote(Scanner& scanner, int fields, Votes& votes) {
   const std::string_view tag = scanner.tag();
   ++votes.lines;
   if (!is_word(tag)) {
-    scanner.expect_row({}, "");
-    const int fields = scanner.count_fields();
     if (!is_number_like(tag)) return;
     ++votes.rows[std::min(fields, kLongestRow)];
     votes.nanoseconds += is_nanoseconds(tag);
@@ -174,8 +172,9 @@ Likelihood look_at(std::string_view text) {
   Scanner scanner(rows.is_changed() ? rows.text() : text, "");
   BalVotes bal;
   while (votes.lines < kLines && scanner.next_line()) {
-    bal.vote(scanner);
-    vote(scanner, votes);
+    const int fields = is_word(scanner.tag()) ? 0 : scanner.count_fields();
+    bal.vote(scanner, fields);
+    vote(scanner, fields, votes);
   }
   if (votes.lines == 0 || text.substr(0, 4096).find('\0') != std::string_view::npos) return {};
   settle_undecided(votes);
