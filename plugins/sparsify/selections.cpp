@@ -10,6 +10,7 @@
 #include <optional>
 #include <queue>
 #include <set>
+#include <tuple>
 #include <utility>
 
 #include <Eigen/Core>
@@ -83,6 +84,33 @@ std::vector<int> LeastLoss::choose(const Graph& graph, std::span<const int> node
   return chosen;
 }
 
+namespace {
+
+/// How many nodes in a row, in the order of the graph, have left.
+class Gaps {
+ public:
+  explicit Gaps(int nodes) : before_(nodes), after_(nodes) {}
+  /// The gap that is there once this node has left as well.
+  int without(int node) const { return before_[node] + 1 + after_[node]; }
+  /// The node leaves; `changes(n)` is called around what changes for the nodes at the gap's ends.
+  template <class Changes>
+  void leave(int node, Changes&& changes) {
+    const int gap = without(node);
+    const int first = node - before_[node] - 1, last = node + after_[node] + 1;
+    if (first >= 0) changes(first, [&] { after_[first] = gap; });
+    if (last < static_cast<int>(std::ssize(before_))) changes(last, [&] { before_[last] = gap; });
+  }
+
+ private:
+  std::vector<int> before_, after_;  ///< of each node that is there: how many beside it have left
+};
+
+/// What leaves a longer gap waits until nothing else may leave: a factor that stands for a long
+/// drive is far from linear.
+constexpr int kLongGap = 8;
+
+}  // namespace
+
 std::vector<int> SmallestBlanket::choose(const Graph& graph, std::span<const int> nodes,
                                          Sparsifier& /*sparsifier*/, int count) {
   std::vector<std::set<int>> neighbours(graph.variable_count());
@@ -93,31 +121,37 @@ std::vector<int> SmallestBlanket::choose(const Graph& graph, std::span<const int
       }
     }
   }
-  std::set<std::pair<std::size_t, int>> queue;
+  Gaps gaps(graph.variable_count());
+  const auto rank = [&](int v) {
+    const int gap = gaps.without(v);
+    return std::tuple(gap > kLongGap, neighbours[v].size(), gap, v);
+  };
+  std::set<std::tuple<bool, std::size_t, int, int>> queue;
   std::vector<bool> may(graph.variable_count());
   for (const int v : nodes) {
     may[v] = true;
-    queue.emplace(neighbours[v].size(), v);
+    queue.insert(rank(v));
   }
+  const auto change = [&](int node, auto&& what) {
+    if (may[node]) queue.erase(rank(node));
+    what();
+    if (may[node]) queue.insert(rank(node));
+  };
   const auto wanted = static_cast<std::size_t>(count);
   std::vector<int> chosen;
   while (chosen.size() < wanted && !queue.empty()) {
-    const int v = queue.begin()->second;
+    const int v = std::get<3>(*queue.begin());
     queue.erase(queue.begin());
-    chosen.push_back(v);
-    const std::vector<int> around(neighbours[v].begin(), neighbours[v].end());
-    const auto change = [&](int node, auto&& what) {
-      if (may[node]) queue.erase({neighbours[node].size(), node});
-      what(neighbours[node]);
-      if (may[node]) queue.emplace(neighbours[node].size(), node);
-    };
-    for (const int other : around) change(other, [&](std::set<int>& of) { of.erase(v); });
     may[v] = false;
+    chosen.push_back(v);
+    gaps.leave(v, change);
+    const std::vector<int> around(neighbours[v].begin(), neighbours[v].end());
+    for (const int other : around) change(other, [&] { neighbours[other].erase(v); });
     for (std::size_t k = 0; around.size() > 1 && k < around.size(); ++k) {
       const int a = around[k], b = around[(k + 1) % around.size()];
       if (a == b) continue;
-      change(a, [&](std::set<int>& of) { of.insert(b); });
-      change(b, [&](std::set<int>& of) { of.insert(a); });
+      change(a, [&] { neighbours[a].insert(b); });
+      change(b, [&] { neighbours[b].insert(a); });
     }
   }
   return chosen;
