@@ -39,18 +39,30 @@ double DensePoses::chi2() const {
   return sum;
 }
 
+Eigen::Index DensePoses::turns(const DensePose& pose) {
+  return pose.R.rows() * (pose.R.rows() - 1) / 2;
+}
+
+Eigen::Index DensePoses::before(int pose) const {
+  Eigen::Index sum = 0;
+  for (int k = 0; k < pose; ++k) sum += size(k);
+  return sum;
+}
+
 DensePose DensePoses::moved(const DensePose& pose, const VectorXd& step) {
   const Eigen::Index d = pose.t.size();
+  if (turns(pose) == 0) return {pose.R, pose.t + step};
   return {pose.R * rotation(step.tail(step.size() - d)), pose.t + pose.R * step.head(d)};
 }
 
 MatrixXd DensePoses::jacobian(const Measurement& one, int pose) const {
   constexpr double kStep = 1e-3;
   std::vector<DensePose> there = poses;
-  MatrixXd J(one.root.rows(), size());
-  for (int k = 0; k < size(); ++k) {
+  const Eigen::Index n = size(pose);
+  MatrixXd J(one.root.rows(), n);
+  for (Eigen::Index k = 0; k < n; ++k) {
     const auto at = [&](double steps) {
-      there[pose] = moved(poses[pose], VectorXd::Unit(size(), k) * (steps * kStep));
+      there[pose] = moved(poses[pose], VectorXd::Unit(n, k) * (steps * kStep));
       return one.error(there);
     };
     const VectorXd difference = 8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0));
@@ -60,28 +72,29 @@ MatrixXd DensePoses::jacobian(const Measurement& one, int pose) const {
 }
 
 DensePoses::Normal DensePoses::normal_equations() const {
-  const Eigen::Index n = size(), all = n * std::ssize(poses);
+  const Eigen::Index all = before(static_cast<int>(poses.size()));
   Normal normal{MatrixXd::Zero(all, all), VectorXd::Zero(all)};
   for (const Measurement& one : measurements_) {
     const VectorXd r = residual(one);
     std::vector<MatrixXd> J;
     for (const int pose : one.on) J.push_back(jacobian(one, pose));
     for (std::size_t a = 0; a < J.size(); ++a) {
-      normal.g.segment(n * one.on[a], n) -= J[a].transpose() * r;
-      for (std::size_t b = 0; b < J.size(); ++b)
-        normal.H.block(n * one.on[a], n * one.on[b], n, n) += J[a].transpose() * J[b];
+      const Eigen::Index row = before(one.on[a]);
+      normal.g.segment(row, J[a].cols()) -= J[a].transpose() * r;
+      for (std::size_t b = 0; b < J.size(); ++b) {
+        normal.H.block(row, before(one.on[b]), J[a].cols(), J[b].cols()) += J[a].transpose() * J[b];
+      }
     }
   }
   return normal;
 }
 
 void DensePoses::solve() {
-  const Eigen::Index n = size();
   for (int k = 0; k < 100; ++k) {
     const Normal normal = normal_equations();
     const VectorXd step = normal.H.ldlt().solve(normal.g);
-    for (std::size_t p = 0; p < poses.size(); ++p)
-      poses[p] = moved(poses[p], step.segment(n * static_cast<Eigen::Index>(p), n));
+    for (int p = 0; p < std::ssize(poses); ++p)
+      poses[p] = moved(poses[p], step.segment(before(p), size(p)));
     if (step.norm() < 1e-11) return;
   }
 }

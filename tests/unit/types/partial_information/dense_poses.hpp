@@ -8,7 +8,7 @@
 
 namespace cairn::test {
 
-/// A pose of the plane or of space by its matrices.
+/// A pose of the plane or of space by its matrices; a point where R is empty.
 struct DensePose {
   Eigen::MatrixXd R;
   Eigen::VectorXd t;
@@ -32,7 +32,7 @@ class DensePoses {
   /// A measurement of the poses `on` whose error has that information, which may be singular.
   void add(std::vector<int> on, Error error, const Eigen::MatrixXd& information);
   double chi2() const;
-  /// JᵀJ for a step of R·exp(ω) and t + R·v, with (v, ω) of each pose in turn.
+  /// JᵀJ for a step of R·exp(ω) and t + R·v, with (v, ω) of each pose in turn; of a point, t + v.
   Eigen::MatrixXd H() const { return normal_equations().H; }
   /// Gauss-Newton until the steps are nothing.
   void solve();
@@ -51,7 +51,10 @@ class DensePoses {
   /// Whitened Jacobian by the step of one pose, from differences of the fourth order.
   Eigen::MatrixXd jacobian(const Measurement& one, int pose) const;
   Eigen::VectorXd residual(const Measurement& one) const { return one.root * one.error(poses); }
-  int size() const { return poses.front().t.size() == 2 ? 3 : 6; }
+  /// Degrees of freedom of a pose or point, and of all before it.
+  Eigen::Index size(int pose) const { return poses[pose].t.size() + turns(poses[pose]); }
+  Eigen::Index before(int pose) const;
+  static Eigen::Index turns(const DensePose& pose);
   static DensePose moved(const DensePose& pose, const Eigen::VectorXd& step);
 
   std::vector<Measurement> measurements_;
