@@ -11,6 +11,7 @@
 #include <fmt/core.h>
 
 #include "cairn/graph/packed.hpp"
+#include "cairn/graph/rounding.hpp"
 #include "cairn/plugin/plugin_search.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/typed/symbol.hpp"
@@ -123,7 +124,7 @@ void Draft::finish_factor(const Scanner& scanner, const Arrangement& arrangement
   // Semidefinite is fine: it leaves a direction open. But the square of any numbers read as iSAM's
   // root is semidefinite: there they must not fit another meaning.
   std::vector<double> root(information.size());
-  const bool semidefinite = square_root(information, kind.residual, root);
+  const bool semidefinite = square_root_of_doubles(information, kind.residual, root);
   if (semidefinite && (!arrangement.is_root || advice(factor, scanner).empty())) return;
   if (!semidefinite && settle(factor, scanner, arrangement)) return;
   refuse_information(factor, scanner, arrangement);
@@ -136,7 +137,9 @@ bool Draft::settle(const Factor& factor, const Scanner& scanner, const Arrangeme
   std::vector<double> as_in_file(fields.size()), rounding(information.size());
   printed_rounding(fields, as_in_file);
   arrangement.to_rows(as_in_file, rounding);
-  if (!settle_rounding(factor_kinds_[factor.kind].residual, rounding, information)) return false;
+  const int n = factor_kinds_[factor.kind].residual;
+  if (are_texts_of_floats(fields)) add_float_rounding(n, information, rounding);
+  if (!settle_rounding(n, rounding, information)) return false;
   settled_.add(fmt::format("{} in line {}", describe(factor), factor.line));
   return true;
 }
@@ -452,7 +455,8 @@ void Draft::write_notes() {
                                          tally.count == 1 ? "" : "the first is ", tally.first));
   };
   note(settled_, "factor", "factors",
-       " had information that was not positive semidefinite by less than its printed digits; it "
+       " had information that was not positive semidefinite by less than rounding changes its "
+       "numbers; it "
        "was set to the nearest semidefinite matrix");
   note(without_effect_, "factor has zero information and", "factors have zero information and",
        " no effect (left out)");

@@ -7,8 +7,7 @@
 #include <limits>
 #include <vector>
 
-#include "cairn/graph/packed.hpp"
-#include "dense/eigenvalues.hpp"
+#include "scanner.hpp"
 
 namespace cairn::formats {
 namespace {
@@ -74,30 +73,16 @@ void printed_rounding(std::span<const std::string_view> fields, std::span<double
   }
 }
 
-bool settle_rounding(int n, std::span<const double> rounding, std::span<double> information) {
-  Eigen::MatrixXd A = unpack(information, n), R = unpack(rounding, n);
-  // What computing in doubles leaves of zero before anything is printed.
-  R.array() += 4.0 * std::numeric_limits<double>::epsilon() * A.cwiseAbs().maxCoeff();
-  const Eigen::VectorXd size = R.diagonal().cwiseSqrt();
-  const Eigen::VectorXd scale = size.cwiseInverse();
-  if (!scale.allFinite() || !R.allFinite()) return false;
-  const Eigen::MatrixXd scaled = scale.asDiagonal() * A * scale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
-  if (eigen.info() != Eigen::Success) return false;
-  for (int k = 0; k < n && eigen.eigenvalues()(k) < 0.0; ++k) {
-    const Eigen::VectorXd w = scale.cwiseProduct(eigen.eigenvectors().col(k).cwiseAbs());
-    if (!(eigen.eigenvalues()(k) >= -w.dot(R * w))) return false;
-  }
-  const Eigen::VectorXd kept = eigen.eigenvalues().cwiseMax(0.0);
-  const Eigen::MatrixXd& V = eigen.eigenvectors();
-  const Eigen::MatrixXd nearest = size.asDiagonal() *
-                                  Eigen::MatrixXd(V * kept.asDiagonal() * V.transpose()) *
-                                  size.asDiagonal();
-  std::vector<double> packed(information.size()), root(information.size());
-  pack(Eigen::MatrixXd(0.5 * (nearest + nearest.transpose())), packed.data());
-  if (!square_root(packed, n, root)) return false;
-  std::ranges::copy(packed, information.begin());
-  return true;
+bool are_texts_of_floats(std::span<const std::string_view> fields) {
+  return std::ranges::all_of(fields, [](std::string_view field) {
+    double number = 0.0;
+    if (!parse_number(field, number) || std::abs(number) > std::numeric_limits<float>::max())
+      return false;
+    const Spelling s = spelling_of(field);
+    const int unit = s.has_point && !s.has_exponent ? -s.decimals : s.leading - s.significant + 1;
+    constexpr double kHalf = 0.5 + 1e-3;  // ties, too
+    return std::abs(static_cast<float>(number) - number) <= kHalf * std::pow(10.0, unit);
+  });
 }
 
 }  // namespace cairn::formats

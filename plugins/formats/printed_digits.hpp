@@ -18,12 +18,8 @@ namespace cairn::formats {
 /// was written by hand, and means what it says. A zero is then exact.
 void printed_rounding(std::span<const std::string_view> fields, std::span<double> rounding);
 
-/// Replaces a symmetric n × n matrix A (upper triangle row by row) by the nearest positive
-/// semidefinite one, if one may have been printed as A: if vᵀ A v ≥ −|v|ᵀ R |v| for each
-/// eigenvector v with a negative eigenvalue, R being the rounding of each entry (packed like A).
-/// No semidefinite matrix within R of A fails that. Nearest, and eigenvectors, are those of A
-/// scaled to a common rounding of the diagonal, so that metres and radians do not matter. False,
-/// and nothing is changed, where A is indefinite by more.
-bool settle_rounding(int n, std::span<const double> rounding, std::span<double> information);
+/// Whether each number may be the text of a float, whatever digits it has: the float nearest to it
+/// is within half a unit of its own last digit.
+bool are_texts_of_floats(std::span<const std::string_view> fields);
 
 }  // namespace cairn::formats

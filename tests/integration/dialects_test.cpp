@@ -80,8 +80,9 @@ TEST_F(Dialect, InformationOfACorridorInSixDigits) {
   const Outcome outcome = optimize(file);
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   expect_state("1", {1.00624, -0.00484, 0.01});
-  EXPECT_THAT(unfolded(outcome.err), HasSubstr("1 factor had information that was not positive "
-                                               "semidefinite by less than its printed digits"));
+  EXPECT_THAT(unfolded(outcome.err),
+              HasSubstr("1 factor had information that was not positive "
+                        "semidefinite by less than rounding changes its numbers"));
 }
 
 TEST_F(Dialect, SkippedVerticesTakeTheirFactorsAlong) {

@@ -53,6 +53,33 @@ def test_information_has_several_shapes():
     assert_allclose(bulk(walk, sigmas=0.5).information("EDGE_SE2")[3], 4 * np.eye(3))
 
 
+def test_information_of_single_precision_may_be_singular():
+    rng = np.random.default_rng(1)
+    indefinite = 0
+    for k in range(50):
+        root = rng.normal(size=(3, 2)) * 10 ** rng.uniform(0, 3, size=2)
+        information = (root @ root.T).astype(np.float32)
+        indefinite += np.linalg.eigvalsh(information.astype(float))[0] < -1e-9 * information.max()
+        graph = cairn.Graph()
+        graph.add_variables("VERTEX_SE2", [0, 1], np.zeros((2, 3)))
+        graph.add(cairn.Between(0, 1, cairn.Pose2(1, 0, 0)), information=information)
+        graph.add_factors("EDGE_SE2", [[0, 1]], [[1, 0, 0]], information=information)
+        assert_allclose(graph.squared_norms(), information[0, 0], rtol=1e-5)
+        doubles = information.astype(float) * (1 + 1e-12)  # refused where they are no floats
+        if np.linalg.eigvalsh(doubles)[0] < -1e-9 * doubles.max():
+            with pytest.raises(cairn.Error, match="not positive semidefinite"):
+                graph.add(cairn.Between(0, 1, cairn.Pose2(1, 0, 0)), information=doubles)
+    assert indefinite > 10
+    # An inverse of floats is not symmetric to the digits of doubles.
+    covariance = np.array([[2, 1.9, 0.3], [1.9, 2, 0.31], [0.3, 0.31, 0.1]], dtype=np.float32)
+    skew = np.linalg.inv(covariance)
+    skew[0, 1] *= np.float32(1 + 1e-6)
+    graph.add(cairn.Between(0, 1, cairn.Pose2(1, 0, 0)), information=skew)
+    graph.add_factors("EDGE_SE2", [[0, 1]], [[1, 0, 0]], information=skew)
+    with pytest.raises(cairn.Error, match="symmetric"):
+        graph.add(cairn.Between(0, 1, cairn.Pose2(1, 0, 0)), information=skew.astype(float) + np.triu(np.full((3, 3), 1e-6), 1))
+
+
 def test_any_layout_of_memory_will_do():
     walk = dense.loop()
     ids, states, pairs, measurements, information = arrays_of(walk)

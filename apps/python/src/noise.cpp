@@ -8,6 +8,7 @@
 
 #include "arrays.hpp"
 #include "cairn/graph/information.hpp"
+#include "cairn/graph/rounding.hpp"
 #include "cairn/runtime/error.hpp"
 #include "measured.hpp"
 
@@ -37,10 +38,12 @@ std::vector<double> information_of(const double* numbers, int n) {
 
 /// Packs one of many matrices, whose symmetry is checked here; the rest is, when it is added.
 void pack_symmetric(const double* A, int n, std::size_t number, double* out) {
+  const bool floats = are_floats({A, size_of(n) * size_of(n)});
+  const double allowed = floats ? 1e-5 : 1e-9;
   for (int row = 0; row < n; ++row) {
     for (int column = row; column < n; ++column) {
       const double upper = A[row * n + column], lower = A[column * n + row];
-      if (std::abs(upper - lower) > 1e-9 * std::max(std::abs(upper), std::abs(lower))) {
+      if (std::abs(upper - lower) > allowed * std::max(std::abs(upper), std::abs(lower))) {
         throw Error(ErrorCode::input,
                     fmt::format("information[{}] is not symmetric: entries ({}, {}) and ({}, {}) "
                                 "are {} and {}",

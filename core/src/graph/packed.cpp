@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
+#include "cairn/graph/rounding.hpp"
 #include "dense/cholesky.hpp"
 #include "dense/eigenvalues.hpp"
 
@@ -135,11 +137,23 @@ bool reflected_root(std::span<const double> A, int n, std::span<double> root) {
   return true;
 }
 
+/// Of the semidefinite matrix that may have been rounded to floats.
+bool root_of_floats(std::span<const double> A, int n, std::span<double> U) {
+  if (!are_floats(A)) return false;
+  std::vector<double> settled(A.begin(), A.end()), rounding(A.size(), 0.0);
+  add_float_rounding(n, A, rounding);
+  return settle_rounding(n, rounding, settled) && square_root_of_doubles(settled, n, U);
+}
+
 }  // namespace
 
-bool square_root(std::span<const double> A, int n, std::span<double> U) {
+bool square_root_of_doubles(std::span<const double> A, int n, std::span<double> U) {
   if (n == 0) return true;
   return cholesky(A, n, U) || cholesky_with_zeros(A, n, U) || reflected_root(A, n, U);
+}
+
+bool square_root(std::span<const double> A, int n, std::span<double> U) {
+  return square_root_of_doubles(A, n, U) || root_of_floats(A, n, U);
 }
 
 }  // namespace cairn

@@ -58,8 +58,8 @@ inline Eigen::MatrixXd unpack(std::span<const double> packed, int n) {
 /// The square root U of a packed symmetric matrix A: upper triangular with UᵀU = A and no negative
 /// entry on its diagonal, packed into `root` (packed_size(n) doubles, which may be those of A).
 /// That is the Cholesky factor where A is positive definite; where it is semidefinite U has a row
-/// of zeros for each direction that A lacks. False, with no meaning in `root`, if A is indefinite
-/// (by more than rounding, relative to its diagonal) or not finite.
+/// of zeros for each direction that A lacks. False, with no meaning in `root`, if A is not finite,
+/// or indefinite by more than the rounding of its diagonal: of floats where all numbers are floats.
 CAIRN_API bool square_root(std::span<const double> A, int n, std::span<double> root);
 
 }  // namespace cairn

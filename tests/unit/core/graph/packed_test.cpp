@@ -4,11 +4,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
 
+#include "cairn/graph/rounding.hpp"
 #include "support/sampling.hpp"
 
 namespace cairn {
@@ -90,6 +92,38 @@ TEST(SquareRoot, KeepsDirectionsThatAreNotMeasuredAtZero) {
   ASSERT_TRUE(square_root(std::vector<double>{4e8, 0, 0, 9e-1, 0, 0}, 3, U));
   EXPECT_THAT(U,
               ElementsAre(testing::DoubleEq(2e4), 0, 0, testing::DoubleEq(std::sqrt(0.9)), 0, 0));
+}
+
+TEST(SquareRoot, OfFloatsIsThatOfTheirRounding) {
+  test::Sampler sampler(4);
+  int only_by_rounding = 0;
+  for (const int n : {2, 3, 6, 9}) {
+    for (int k = 0; k < 50; ++k) {
+      const Eigen::MatrixXd B = random(sampler, n - 1, n);
+      Eigen::VectorXd units(n);
+      for (double& unit : units) unit = std::pow(10.0, sampler.uniform(0.0, 3.0));
+      const Eigen::MatrixXf root = (B * units.asDiagonal()).cast<float>();
+      const Eigen::MatrixXd A = Eigen::MatrixXf(root.transpose() * root).cast<double>();
+      std::vector<double> U(packed_size(n));
+      ASSERT_TRUE(square_root(pack(A), n, U)) << n << " " << k;
+      const Eigen::MatrixXd kept = triangle(U, n).transpose() * triangle(U, n);
+      const Eigen::VectorXd scale = A.diagonal().cwiseSqrt().cwiseInverse();
+      EXPECT_LT((scale.asDiagonal() * (kept - A) * scale.asDiagonal()).norm(), 1e-5);
+      only_by_rounding += !square_root_of_doubles(pack(A), n, U);
+    }
+  }
+  EXPECT_GT(only_by_rounding, 50);
+}
+
+TEST(SquareRoot, OfFloatsIsRefusedWhereTheyAreIndefinite) {
+  std::vector<double> U(3);
+  for (const double corner : {0.999, 1.0 - 1e-5, -1e-5, -1e-3}) {
+    const std::vector<double> A{1.0, corner < 0.0 ? 0.0 : 1.0, double(float(corner))};
+    EXPECT_FALSE(square_root(A, 2, U)) << corner;
+  }
+  // Not of floats: as near as doubles are.
+  EXPECT_FALSE(square_root(std::vector<double>{1.0, 1.0, 1.0 - 5e-8 + 1e-15}, 2, U));
+  EXPECT_TRUE(square_root(std::vector<double>{1.0, 1.0, 1.0 - 0x1p-24}, 2, U));
 }
 
 TEST(SquareRoot, IsInPlaceToo) {

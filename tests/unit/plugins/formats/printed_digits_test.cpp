@@ -94,15 +94,35 @@ TEST(PrintedDigits, TheNearestSemidefiniteMatrixIsTakenCountedAndNoted) {
   const Reading r = read("g2o", "EDGE_SE2 0 1 1 0 0" + corridor + "EDGE_SE2 1 2 1 0 0" + corridor);
   EXPECT_THAT(r.report.notes[0], HasSubstr("the file has no vertices"));
   EXPECT_EQ(r.report.notes[1],
-            "2 factors had information that was not positive semidefinite by less than its printed "
-            "digits; it was set to the nearest semidefinite matrix: the first is EDGE_SE2 0 1 in "
-            "line 1");
+            "2 factors had information that was not positive semidefinite by less than rounding "
+            "changes its numbers; it was set to the nearest semidefinite matrix: the first is "
+            "EDGE_SE2 0 1 in line 1");
   const Eigen::Matrix3d A = unpack<3>(r.information(0).data());
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(A);
   EXPECT_NEAR(eigen.eigenvalues()(0) / eigen.eigenvalues()(2), 0.0, 1e-15);
   const double expected[] = {307121, -243387, -342143, 192879, 271141, 1.6817e7};
   for (int k = 0; k < 6; ++k) EXPECT_NEAR(r.information(0)[k], expected[k], 0.5) << k;
   EXPECT_EQ(r.graph.information_rank(0), 2);
+}
+
+/// Front ends keep matrices in single precision, and print them with digits enough for doubles.
+TEST(PrintedDigits, InformationOfFloatsIsReadWithEveryDigitOfADouble) {
+  std::mt19937_64 engine(4);
+  int settled = 0;
+  for (const char* format : {"%.8g", "%.9g", "%.10g", "%.12g", "%.17g", "%.20f", "%.8e"}) {
+    for (const Kind& kind : kinds()) {
+      for (int k = 0; k < 40; ++k) {
+        const Eigen::MatrixXd A =
+            semidefinite(kind.size, kind.size - 1, engine).cast<float>().cast<double>();
+        const std::string text = kind.vertices + kind.edge + printed(A, format);
+        ASSERT_EQ(refusal("g2o", text), "") << format;
+        const Reading r = read("g2o", text);
+        settled += !r.report.notes.empty();
+        EXPECT_LT((unpack(r.information(0), kind.size) - A).norm(), 1e-5 * A.norm()) << text;
+      }
+    }
+  }
+  EXPECT_GT(settled, 200);
 }
 
 TEST(PrintedDigits, ToroHasThemInItsOwnOrder) {
@@ -133,7 +153,9 @@ TEST(PrintedDigits, WhatIsReallyIndefiniteStaysRefused) {
            "100.5 100.5 0 100.25 0 100",                                //
            "0 1 0 5 0 1",                                               // beside an exact zero
            "307121 -243387 -342143 192800 271141 1.6817e+07",  // −40, where digits are below one
-           "1 0.999 0.999 1 -0.999 1",  // each pair is possible, the three are not
+           "1 0.999 0.999 1 -0.999 1",       // each pair is possible, the three are not
+           "1 1 0 0.99998998641967773 0 1",  // floats, by more than their rounding
+           "1 1 0 0.99999995000000 0 1",     // by the rounding of floats, which they are not
        }) {
     EXPECT_THAT(refusal("g2o", vertices + edge + information + "\n"),
                 HasSubstr("is not positive semidefinite"))

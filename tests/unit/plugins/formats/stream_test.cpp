@@ -85,7 +85,7 @@ TEST_F(Stream, NotesWhatItChanges) {
                           "VERTEX_SE3:QUAT 0 in line 1 with the norm 2"));
   const StreamLine corridor =
       read("EDGE_SE2 0 1 1.01 0 0.01 307121 -243387 -342143 192879 271141 1.6817e+07");
-  EXPECT_THAT(corridor.notes, ElementsAre(HasSubstr("less than its printed digits")));
+  EXPECT_THAT(corridor.notes, ElementsAre(HasSubstr("less than rounding changes its numbers")));
   EXPECT_THAT(read("EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1").notes, IsEmpty());
 }
 
