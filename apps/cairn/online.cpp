@@ -282,6 +282,11 @@ void check(const OnlineOptions& options, Session& session) {
                 "a policy solves when it has to: --solve explicit and --budget are for runs "
                 "without --policy");
   }
+  if (!options.policy.empty() && options.map.empty() && options.input.read.skip_dangling) {
+    throw Error(ErrorCode::usage,
+                "--skip-dangling has no effect with --policy but for the file of --map: a policy "
+                "refuses what leads to poses that it does not know");
+  }
   if (!options.thresholds.empty() && options.policy.empty())
     throw Error(ErrorCode::usage, "--thresholds are those of a policy: give --policy");
   session.files.add_input(options.thresholds);

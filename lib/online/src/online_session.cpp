@@ -62,7 +62,15 @@ void OnlineSession::perform(std::string_view line, const Words& words, Reply& re
 void OnlineSession::take_data(std::string_view text, Reply& reply) {
   StreamLine said = format_.read(text, kStreamName, line(), registry_, settings_.read);
   for (Variable& variable : said.variables) take_variable(std::move(variable));
-  for (Factor& factor : said.factors) take_factor(std::move(factor), reply);
+  bool left_out = false;
+  for (Factor& factor : said.factors) {
+    if (std::string missing = leave_out(factor); !missing.empty()) {
+      said.notes.push_back(std::move(missing));
+      left_out = true;
+    } else {
+      take_factor(std::move(factor), reply);
+    }
+  }
   // Each is held or none: a line is taken in whole.
   for (const Id id : said.held) {
     if (!find_waiting(id)) {
@@ -74,8 +82,21 @@ void OnlineSession::take_data(std::string_view text, Reply& reply) {
     }
   }
   for (const Id id : said.held) hold(id);
-  reply.changes = !said.skipped;
+  reply.changes = !said.skipped && !left_out;
   put_notes(said.notes, reply);
+}
+
+/// Why a factor is left out: on request, where it leads to a variable that never came.
+std::string OnlineSession::leave_out(const Factor& factor) {
+  if (!settings_.read.skip_dangling) return {};
+  for (const Id id : factor.variables) {
+    if (estimator_.has(id) || find_waiting(id)) continue;
+    ++left_out_;
+    return fmt::format("{} {} is left out: there is no variable {} ({} so far)", factor.type->tag(),
+                       fmt::join(factor.variables, " "), id,
+                       left_out_ == 1 ? "1 factor" : fmt::format("{} factors", left_out_));
+  }
+  return {};
 }
 
 void OnlineSession::take_variable(Variable variable) {

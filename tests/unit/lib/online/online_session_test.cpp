@@ -57,6 +57,25 @@ class OnlineSessionTest : public ::testing::Test {
   std::int64_t number_ = 0;
 };
 
+TEST_F(OnlineSessionTest, LeavesOutFactorsOnVariablesThatNeverCameOnRequest) {
+  const std::vector<std::string> lines = {"EDGE_SE2 0 7" + kStep, "EDGE_SE2 8 1" + kStep};
+  take_all(two_poses_);
+  const LineSession::Reply refused = take(lines[0]);
+  EXPECT_TRUE(refused.refused);
+  EXPECT_THAT(refused.text, HasSubstr("there is no variable 7"));
+  begin({.read = {.skip_dangling = true}, .output = "none"});
+  take_all(two_poses_);
+  const LineSession::Reply one = take(lines[0]), two = take(lines[1]);
+  EXPECT_EQ(one.text, "NOTE EDGE_SE2 0 7 is left out: there is no variable 7 (1 factor so far)\n");
+  EXPECT_EQ(two.text, "NOTE EDGE_SE2 8 1 is left out: there is no variable 8 (2 factors so far)\n");
+  EXPECT_FALSE(one.refused);
+  EXPECT_FALSE(one.changes) << "a journal has no use for it";
+  EXPECT_EQ(session_->factor_count(), 1);
+  take("NEW VERTEX_SE2 2");
+  EXPECT_THAT(take("EDGE_SE2 1 2" + kStep).text, Not(HasSubstr("left out")));
+  EXPECT_EQ(session_->factor_count(), 2);
+}
+
 TEST_F(OnlineSessionTest, SuggestsTheCommandForAWordThatIsMisspelt) {
   for (const auto& [misspelt, meant] : {std::pair("SLOVE", "SOLVE"),
                                         {"solve", "SOLVE"},

@@ -71,6 +71,7 @@ class CAIRN_API OnlineSession final : public LineSession {
 
   void take_data(std::string_view text, Reply& reply);
   void take_variable(Variable variable);
+  std::string leave_out(const Factor& factor);
   void take_factor(Factor factor, Reply& reply);
   void hold(Id id);
   const Variable* find_waiting(Id id) const;
@@ -101,7 +102,8 @@ class CAIRN_API OnlineSession final : public LineSession {
   /// Variables that no measurement has touched yet: the estimator gets them with the first that
   /// does.
   std::vector<Variable> waiting_;
-  std::vector<Id> known_;  ///< those that the estimator has, in the order of arrival
+  std::int64_t left_out_ = 0;  ///< factors on variables that never came (`skip_dangling`)
+  std::vector<Id> known_;      ///< those that the estimator has, in the order of arrival
   std::unordered_map<Id, std::shared_ptr<const VariableType>> types_;
   std::unordered_map<Id, std::vector<double>> reported_;  ///< estimates, for `changed`
 };
