@@ -197,6 +197,9 @@ Likelihood look_at(std::string_view text) {
   const bool counts_alone = votes.lines == 1 && text.find_first_of(".eE") == std::string_view::npos;
   likelihood.table =
       counts_alone || votes.nanoseconds > 0 ? 0 : score(std::max(votes.rows[3], votes.rows[4]));
+  // Rows of so many numbers are hardly else, and TUM's reader says how many it expects.
+  const int rows_of_tum = votes.rows[7] + votes.rows[9] + votes.rows[10] + votes.rows[11];
+  if (rows_of_tum > 0 && likelihood.tum == 0 && likelihood.bal == 0) likelihood.tum = 1;
   // Words that no format knows may be tags of a third party's types, which g2o's reader asks the
   // registry for; failing that, it says which line it does not understand.
   if (votes.tagged > 0 && likelihood.g2o == 0) likelihood.g2o = 1;

@@ -22,17 +22,23 @@ std::string lower(std::string_view text) {
   return small;
 }
 
-/// What stands between commas, or between blanks where there are no commas. A unit in brackets goes
-/// with the name before it: "p_x [m]".
+/// Between the fields of a line of words or numbers: semicolons, else commas, else blanks.
+std::string_view separators_of(std::string_view line) {
+  if (line.find(';') != std::string_view::npos) return ";";
+  return line.find(',') == std::string_view::npos ? kBlanks : ",";
+}
+
+/// What stands between semicolons or commas, or between blanks where there are none. A unit in
+/// brackets goes with the name before it: "p_x [m]".
 std::vector<std::string> fields_of(std::string_view line) {
-  const std::string_view separators = line.find(',') == std::string_view::npos ? kBlanks : ",";
+  const std::string_view separators = separators_of(line);
   std::vector<std::string> fields;
   bool in_unit = false;
   while (!line.empty()) {
     const std::size_t end = std::min(line.find_first_of(separators), line.size());
     const std::string field = lower(trimmed(line.substr(0, end)));
     line.remove_prefix(std::min(end + 1, line.size()));
-    if (separators == ",") {
+    if (separators != kBlanks) {
       fields.push_back(field);
       continue;
     }
@@ -68,13 +74,19 @@ bool is_names(std::string_view line) {
          first.find("stamp") != std::string::npos;
 }
 
-/// Not "1,5 2,5 0,5", whose commas are those of decimals.
-bool is_separated_by_commas(std::string_view line) {
+/// By commas or semicolons. Not "1,5 2,5 0,5", whose commas are those of decimals.
+bool is_separated_by_marks(std::string_view line) {
   const std::vector<std::string> fields = fields_of(line);
-  return line.find(',') != std::string_view::npos && fields.size() >= 3 &&
+  return separators_of(line) != kBlanks && fields.size() >= 3 &&
          std::ranges::all_of(fields, [](const std::string& field) {
            return !field.empty() && field.find_first_of(kBlanks) == std::string::npos;
          });
+}
+
+/// "1,5 2,5 0", "1,5;2": a single comma between spaces is a mistake.
+bool has_decimal_commas_in(std::string_view line) {
+  const auto commas = std::ranges::count(line, ',');
+  return separators_of(line) == ";" ? commas > 0 : commas > 1 && !is_separated_by_marks(line);
 }
 
 bool begins_number(std::string_view line) {
@@ -87,6 +99,7 @@ bool begins_number(std::string_view line) {
 RowText::RowText(std::string_view text) : given_(text) {
   constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
   std::size_t at = text.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0;
+  bool has_decimal_commas = false;
   std::optional<std::size_t> names;  // where a line with names that is no comment begins
   while (at < text.size()) {
     const std::size_t end = std::min(text.find('\n', at), text.size());
@@ -95,7 +108,8 @@ RowText::RowText(std::string_view text) : given_(text) {
       const bool comment = line.front() == '#';
       if (!comment && (names || !is_names(line))) {
         if (!begins_number(line)) return;  // no rows
-        has_commas_ = is_separated_by_commas(line);
+        has_commas_ = is_separated_by_marks(line);
+        has_decimal_commas = has_decimal_commas_in(line) && text.find('.') == text.npos;
         break;
       }
       if (!comment) names = static_cast<std::size_t>(line.data() - text.data());
@@ -103,10 +117,13 @@ RowText::RowText(std::string_view text) : given_(text) {
     }
     at = end + 1;
   }
-  if (!names && !has_commas_) return;
+  if (!names && !has_commas_ && !has_decimal_commas) return;
   own_ = text;
   if (names) own_[*names] = '#';
-  if (has_commas_) std::ranges::replace(own_, ',', ' ');
+  if (has_decimal_commas) std::ranges::replace(own_, ',', '.');
+  if (has_commas_)
+    std::ranges::replace_if(
+        own_, [](char c) { return c == ',' || c == ';'; }, ' ');
 }
 
 void RowText::read_names(std::string_view line) {

@@ -9,9 +9,10 @@
 
 namespace cairn::formats {
 
-/// A text of rows of numbers as trajectories have them, made fit for a `Scanner`: commas between
-/// fields become spaces, and a line with the names of the columns a comment. Lines keep their
-/// numbers. A text that begins otherwise is left as it is.
+/// A text of rows of numbers as trajectories have them, made fit for a `Scanner`: commas and
+/// semicolons between fields become spaces, a line with the names of the columns a comment, and
+/// commas of decimals points where the text has no point. Lines keep their numbers. A text that
+/// begins otherwise is left as it is.
 class RowText {
  public:
   /// `text` must outlive this.
@@ -21,6 +22,7 @@ class RowText {
 
   std::string_view text() const { return own_.empty() ? given_ : std::string_view(own_); }
   bool is_changed() const { return !own_.empty(); }
+  /// Between fields; semicolons, too.
   bool has_commas() const { return has_commas_; }
   /// The column, from 0, of a quaternion's w by the names of the columns; none if they do not say.
   std::optional<int> column_of_w() const { return column_of_w_; }

@@ -195,6 +195,46 @@ TEST(Trajectory, TablesHaveAnIdOrGoByRow) {
             "file:2: a row x y theta with 4 fields; expected 3 fields (3 numbers)");
 }
 
+TEST(Trajectory, TimesAreNoCoordinates) {
+  const std::string expected =
+      "; expected rows x y theta or id x y theta, or with times those of TUM: time x y z qx qy qz "
+      "qw";
+  EXPECT_EQ(refusal("table", "1403636580.0 0 0\n1403636580.5 1 0.2\n"),
+            "file:1: the first of three columns rises from 1403636580 on, as times since 1970 do" +
+                expected);
+  EXPECT_EQ(refusal("table", "1403636580123 0 0\n1403636580623 1 0.2\n").substr(0, 41),
+            "file:1: the first of three columns rises ");
+  EXPECT_EQ(refusal("table", "1403636580.0 0 0 1\n1403636580.5 1 0.2 1\n"),
+            "file:1: a row of four numbers begins with 1403636580.0, which is no id" + expected);
+  const std::string note =
+      "rows are taken for x y theta, though the first column rises as times do, and the third goes "
+      "beyond two turns";
+  EXPECT_THAT(read("table", "0 0 0\n0.5 1 20\n1 1 25\n").report.notes, ElementsAre(note));
+  EXPECT_THAT(read("table", "0 0 0\n0.5 1 20\n0.4 1 25\n").report.notes, IsEmpty());
+  EXPECT_THAT(read("table", "0 0 0\n0.5 1 2\n1 1 2.5\n").report.notes, IsEmpty());
+}
+
+TEST(Trajectory, IsReadWhateverSeparatesItsNumbers) {
+  const Reading points = read("tum", "0.5 1.5 2 3 0 0 0 1\n1 2.5 2 3 0 0 0 1\n");
+  for (const char* text :
+       {"0.5;1.5;2;3;0;0;0;1\n1;2.5;2;3;0;0;0;1\n", "0,5;1,5;2;3;0;0;0;1\n1,0;2,5;2;3;0;0;0;1\n",
+        "t;x;y;z;qx;qy;qz;qw\n0,5; 1,5; 2; 3; 0; 0; 0; 1\n1;2,5;2;3;0;0;0;1\n",
+        "0,5 1,5 2 3 0 0 0 1\n1,0 2,5 2 3 0 0 0 1\n"}) {
+    EXPECT_EQ(detected(text), "tum") << text;
+    const Reading r = read("tum", text);
+    EXPECT_EQ(r.report.stamps, points.report.stamps) << text;
+    for (const Id id : {0, 1}) EXPECT_EQ(r.state(id), points.state(id)) << text;
+  }
+}
+
+TEST(Trajectory, WithMoreColumnsSaysHowManyAreExpected) {
+  for (const char* more : {" 0.1", " 0.1 0.2", " 1 2 3"}) {
+    const std::string row = "0.5 1.5 2 3 0 0 0 1" + std::string(more) + "\n", text = row + row;
+    EXPECT_EQ(detected(text), "tum");
+    EXPECT_THAT(refusal("tum", text), HasSubstr("fields; expected 8 fields"));
+  }
+}
+
 TEST(Trajectory, ComparesWithItselfWithoutError) {
   const Reading planar = read("table", "0 0 0\n1 0 0.1\n2 0.5 0.2\n3 1 3\n");
   for (const char* format : {"tum", "kitti"}) {
