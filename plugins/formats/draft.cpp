@@ -168,17 +168,17 @@ void Draft::refuse_information(const Factor& factor, const Scanner& scanner,
   const FactorKind& kind = factor_kinds_[factor.kind];
   const std::span<const double> information{numbers_.data() + factor.numbers + kind.measurement,
                                             static_cast<std::size_t>(kind.information)};
-  const auto failed = first_failed_pivot(kind.residual, information);
   const std::string found =
       arrangement.is_root
           ? fmt::format(
                 "the square root of the information of {} has a zero on its diagonal (row "
                 "{})",
-                describe(factor), failed->row + 1)
+                describe(factor), first_failed_pivot(kind.residual, information)->row + 1)
           : fmt::format(
-                "the information of {} is not positive semidefinite (pivot {} of its "
-                "Cholesky factor is {:.6g}); expected a positive semidefinite {}x{} matrix",
-                describe(factor), failed->row + 1, failed->pivot, kind.residual, kind.residual);
+                "the information of {} is not positive semidefinite ({}); expected a positive "
+                "semidefinite {}x{} matrix",
+                describe(factor), what_is_indefinite(kind.residual, information), kind.residual,
+                kind.residual);
   fail(factor.line, found + advice(factor, scanner));
 }
 

@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
+
 #include "cairn/graph/packed.hpp"
 
 namespace cairn::formats {
@@ -78,6 +80,29 @@ std::optional<FailedPivot> first_failed_pivot(int n, std::span<const double> inf
     }
   }
   return std::nullopt;
+}
+
+std::string what_is_indefinite(int n, std::span<const double> information) {
+  std::vector<double> rest(information.begin(), information.end());
+  for (int row = 0; row < n; ++row) {
+    const auto diagonal = static_cast<std::size_t>(triangle_index(n, row, row));
+    if (information[diagonal] < 0.0)
+      return fmt::format("entry ({0}, {0}) is {1:.6g}", row + 1, information[diagonal]);
+    if (information[diagonal] == 0.0) rest[diagonal] = 1.0;  // of a row that measures nothing
+  }
+  for (int row = 0; row < n; ++row) {
+    for (int column = 0; column < n; ++column) {
+      const auto [i, j] = std::minmax(row, column);
+      const double entry = information[static_cast<std::size_t>(triangle_index(n, i, j))];
+      if (information[static_cast<std::size_t>(triangle_index(n, row, row))] == 0.0 && entry != 0.0)
+        return fmt::format("entry ({0}, {0}) is 0, and ({0}, {1}) is {2:.6g}", row + 1, column + 1,
+                           entry);
+    }
+  }
+  const auto failed = first_failed_pivot(n, rest);
+  return failed ? fmt::format("pivot {} of its Cholesky factor is {:.6g}", failed->row + 1,
+                              failed->pivot)
+                : "by more than rounding";
 }
 
 bool repair_misplaced_entries(std::span<double, 21> information) {

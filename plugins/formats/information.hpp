@@ -47,6 +47,10 @@ inline bool is_positive_definite(int n, std::span<const double> information) {
   return !first_failed_pivot(n, information);
 }
 
+/// Why a matrix is not positive semidefinite: a negative entry of its diagonal, one of zero beside
+/// others in its row, else the pivot of its Cholesky factor that is negative.
+std::string what_is_indefinite(int n, std::span<const double> information);
+
 /// Repairs a known mistake in the information of a spatial relative pose (21 numbers, rows x y z rx
 /// ry rz): the (z, rx) and (z, ry) entries contain the values of (x, rz) and (y, rz), as in the
 /// published `cubicle`. Changes nothing, and returns false, unless the matrix is not positive

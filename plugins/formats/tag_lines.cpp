@@ -5,6 +5,8 @@
 #include <array>
 #include <cstddef>
 #include <span>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include <fmt/core.h>
@@ -24,8 +26,16 @@ void read_fix(Scanner& scanner, Draft& draft) {
 
 namespace {
 
+/// Tags of g2o that are not read, and what is to be written instead.
+constexpr std::array<std::pair<std::string_view, std::string_view>, 1> kInstead{
+    {{"EDGE_BEARING_SE2_XY",
+      "EDGE_BEARING_RANGE_SE2_XY with information 0 of the range (bearing, any range, I11 0 0)"}}};
+
 std::string remedy(std::string_view tag, std::span<const std::string> on_offer,
                    std::span<const std::string> commands) {
+  for (const auto& [other, instead] : kInstead) {
+    if (tag == other) return fmt::format("; expected {}", instead);
+  }
   std::vector<std::string> words(on_offer.begin(), on_offer.end());
   words.insert(words.end(), commands.begin(), commands.end());
   const std::string nearest = nearest_spelling(tag, words);

@@ -88,8 +88,17 @@ INSTANTIATE_TEST_SUITE_P(
                 "the information of EDGE_SE2 0 1 is not positive semidefinite (pivot 2 of its "
                 "Cholesky factor is -3); expected a positive semidefinite 3x3 matrix"},
         BadLine{"NegativeInformation", "EDGE_SE2 0 1 1 0 0 -4 0 0 1 0 1",
-                "the information of EDGE_SE2 0 1 is not positive semidefinite (pivot 1 of its "
-                "Cholesky factor is -4); expected a positive semidefinite 3x3 matrix"},
+                "the information of EDGE_SE2 0 1 is not positive semidefinite (entry (1, 1) is "
+                "-4); expected a positive semidefinite 3x3 matrix"},
+        BadLine{"NegativeBesideZero", "EDGE_SE2 0 1 1 0 0 0.0000 0 0 -0.0000001 0 100",
+                "the information of EDGE_SE2 0 1 is not positive semidefinite (entry (2, 2) is "
+                "-1e-07); expected a positive semidefinite 3x3 matrix"},
+        BadLine{"ZeroBesideOthers", "EDGE_SE2 0 1 1 0 0 0 3 0 22 0 0",
+                "the information of EDGE_SE2 0 1 is not positive semidefinite (entry (1, 1) is 0, "
+                "and (1, 2) is 3); expected a positive semidefinite 3x3 matrix"},
+        BadLine{"IndefiniteBesideZero", "EDGE_SE2 0 1 1 0 0 0 0 0 1 2 1",
+                "the information of EDGE_SE2 0 1 is not positive semidefinite (pivot 3 of its "
+                "Cholesky factor is -3); expected a positive semidefinite 3x3 matrix"},
         BadLine{"NoInformation", "EDGE_SE2 0 1 1 0 0",
                 "EDGE_SE2 0 1 without information; expected 6 numbers more "
                 "(ReadOptions::unit_information takes it as the identity)"},

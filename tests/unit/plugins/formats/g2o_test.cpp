@@ -109,6 +109,13 @@ TEST(G2o, SkipsUnknownTagsOnlyWhenAskedAndCountsThem) {
 TEST(G2o, RefusesAnUnknownTagWithTheNearestSpellingElseAllOnOffer) {
   const std::string near = refusal("g2o", "VERTEX_SE2 0 0 0 0\nEDGE_S2 0 1 1 0 0 1 0 0 1 0 1\n");
   EXPECT_THAT(near, HasSubstr("file:2: unknown tag 'EDGE_S2'; did you mean 'EDGE_SE2'? (Read"));
+  EXPECT_THAT(refusal("g2o", "VERTEX_SE2 0 0 0 0\nEDGE_BEARING_SE2_XY 0 1 0.5 100\n"),
+              HasSubstr("; expected EDGE_BEARING_RANGE_SE2_XY with information 0 of the range"));
+  EXPECT_EQ(read("g2o",
+                 "VERTEX_SE2 0 0 0 0\nVERTEX_XY 1 1 1\n"
+                 "EDGE_BEARING_RANGE_SE2_XY 0 1 0.5 1 100 0 0\n")
+                .graph.information_rank(0),
+            1);
   EXPECT_THAT(near, Not(HasSubstr("on offer")));
   const std::string far = refusal("g2o", "NOTHING_OF_THIS_KIND 0 1\n");
   EXPECT_THAT(far, HasSubstr("file:1: unknown tag 'NOTHING_OF_THIS_KIND'; on offer: "));

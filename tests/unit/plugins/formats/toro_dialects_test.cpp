@@ -131,6 +131,22 @@ TEST(ToroEquivalence, LeavesOutWhatWasMeasuredBetweenThem) {
                                        "the first is in line 8"));
 }
 
+TEST(ToroEquivalence, NamesAMeasurementThatContradictsIt) {
+  const std::string far = "EDGE2 2 3 0.6 0.8 0 100 0 100 100 0 0\nEQUIV 2 3\n";
+  EXPECT_THAT(read("toro", std::string(kChain) + far).report.notes,
+              Contains("1 factor left out, between variables that EQUIV makes one; the first is in "
+                       "line 8. EDGE2 in line 8 contradicts EQUIV: as one variable the two are "
+                       "5.77 standard deviations apart, so that one of the two lines is wrong"));
+}
+
+TEST(ToroEquivalence, OfAVertexWithItselfIsNone) {
+  const Reading r = read("toro", std::string(kChain) + "EQUIV 2 2\n");
+  EXPECT_EQ(r.graph.variable_count(), 4);
+  EXPECT_THAT(r.report.notes, IsEmpty());
+  EXPECT_THAT(read("toro", std::string(kChain) + "EQUIV 2 2\nEQUIV 3 2\n").report.notes,
+              ElementsAre(HasSubstr("3 and 2 are 2 by line 9")));
+}
+
 TEST(ToroEquivalence, IsRefusedForWhatIsNotThereOrOfAnotherType) {
   EXPECT_EQ(refusal("toro", std::string(kChain) + "EQUIV 2 9\n"),
             "file:8: EQUIV 2 9: there is no vertex 9 in this file");
