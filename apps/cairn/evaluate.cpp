@@ -236,6 +236,30 @@ void suggest_axes(const TrajectoryPairs& pairs, const EvaluateOptions& options,
   }
 }
 
+/// Orientations that are far off, and agree when w of the quaternions of one of the two stands at
+/// the other end, as in files that have EuRoC's order without names of columns.
+void suggest_order(const TrajectoryPairs& pairs, const EvaluateOptions& options,
+                   const LoadedGraph& estimate, const LoadedGraph& truth,
+                   const TrajectoryError& error, const Session& session) {
+  constexpr double kFar = 45.0, kShare = 0.1;  // [deg], of the error
+  if (error.ate_rotation < kFar || options.planar) return;
+  for (const LoadedGraph* loaded : {&estimate, &truth}) {
+    const bool w_first = loaded->report.format == "tum";  // in truth, not as it was read
+    if (!w_first && loaded->report.format != "euroc") continue;
+    TrajectoryPairs other = pairs;
+    Trajectory& poses = loaded == &estimate ? other.estimate : other.truth;
+    poses = with_quaternions_of_order(std::move(poses), w_first);
+    const double left = rotation_error(other);
+    if (left > kShare * error.ate_rotation) continue;
+    session.note(fmt::format(
+        "with w of the quaternions of {} {}, the ATE in rotation is {:.6g} deg instead of {:.6g} "
+        "deg; `cairn convert {} mended.tum --from {}` reads them so",
+        loaded->name, w_first ? "first" : "last", left, error.ate_rotation, loaded->name,
+        w_first ? "euroc" : "tum"));
+    return;
+  }
+}
+
 // Divergence --------------------------------------------------------------------------------------
 
 /// D(TRUTH‖ESTIMATE) that was asked for. Without an error: it could not be computed.
@@ -379,7 +403,8 @@ int run(const EvaluateOptions& options, Session& session) {
     }
   }
   const LoadedGraph estimate_graph = load_graph(options.estimate.file, options.input, session);
-  const LoadedGraph truth_graph = load_ground_truth(options.truth.file, options.input, session);
+  const LoadedGraph truth_graph =
+      load_ground_truth(options.truth.file, options.input, session, options.kld);
   std::vector<Id> common;
   if (options.kld) {
     need_factors(estimate_graph);
@@ -398,6 +423,7 @@ int run(const EvaluateOptions& options, Session& session) {
                   session);
   suggest_scale(pairs, options, error, session);
   suggest_axes(pairs, options, error, session);
+  suggest_order(pairs, options, estimate_graph, truth_graph, error, session);
   warn_of_dimensions(estimate_graph, truth_graph, estimate, truth, session);
   Results results(session);
   GraphDivergence divergence;

@@ -155,9 +155,10 @@ LoadedGraph load_graph(const std::string& name, const InputOptions& options, Ses
   return load(name, options, session);
 }
 
-LoadedGraph load_ground_truth(const std::string& name, const InputOptions& options,
-                              Session& session) {
+LoadedGraph load_ground_truth(const std::string& name, InputOptions options, Session& session,
+                              bool with_factors) {
   session.files.add_input(name);
+  options.read.skip_unknown = options.read.skip_unknown || !with_factors;
   LoadedGraph loaded = load(name, options, session);
   if (loaded.truth) loaded.graph = std::move(*loaded.truth);
   loaded.truth.reset();

@@ -38,9 +38,10 @@ struct LoadedGraph {
 LoadedGraph load_graph(const std::string& name, const InputOptions& options, Session& session);
 
 /// The same for the ground truth, which no output may replace: the true states where they are known
-/// beside the graph.
-LoadedGraph load_ground_truth(const std::string& name, const InputOptions& options,
-                              Session& session);
+/// beside the graph. Lines with unknown tags, such as those of measurements that are not read yet,
+/// are skipped unless its factors are wanted, too.
+LoadedGraph load_ground_truth(const std::string& name, InputOptions options, Session& session,
+                              bool with_factors = false);
 
 /// Whether some format of graphs goes by the ending of a file.
 bool has_graph_ending(const std::string& file, Registry& registry);

@@ -253,6 +253,11 @@ TEST_F(Dialect, PyFactorGraphWithRangesIsRefusedByTheirNumber) {
   EXPECT_THAT(unfolded(refused.err),
               HasSubstr("EDGE_RANGE in 1754 lines: ranges are not read yet"));
   EXPECT_EQ(optimize(file, {"--skip-unknown"}).exit_code, 0);
+  // Of the truth only the vertices are wanted.
+  const Outcome compared = cairn({"evaluate", folder_.file("best.g2o"), file});
+  EXPECT_EQ(compared.exit_code, 0) << compared.err;
+  EXPECT_THAT(unfolded(compared.err),
+              HasSubstr("skipped 1754 lines with unknown tag 'EDGE_RANGE'"));
 }
 
 // What is no graph --------------------------------------------------------------------------------

@@ -499,6 +499,27 @@ TEST(EvaluateCommand, AxesOfACameraThatWereForgottenAreNamed) {
               0.0, 1e-6);
 }
 
+TEST(EvaluateCommand, QuaternionsWithWAtTheOtherEndAreNamed) {
+  const TemporaryFolder folder;
+  const std::string truth = folder.file("truth.tum"), first = folder.file("first.tum");
+  write_text(truth,
+             "0.5 0 0 0 0 0 0 1\n1 1 0 0 0 0 0.6 0.8\n1.5 1 1 0 0 0 0.8 0.6\n"
+             "2 0 2 0.5 0 0.6 0.8 0\n");
+  write_text(first,
+             "0.5 0 0 0 1 0 0 0\n1 1 0 0 0.8 0 0 0.6\n1.5 1 1 0 0.6 0 0 0.8\n"
+             "2 0 2 0.5 0 0 0.6 0.8\n");
+  for (const bool of_estimate : {true, false}) {
+    const std::string err =
+        unfolded(cairn({"evaluate", of_estimate ? first : truth, of_estimate ? truth : first}).err);
+    EXPECT_THAT(err, AllOf(HasSubstr("first, the ATE in rotation is"),
+                           HasSubstr("`cairn convert " + first + " mended.tum --from euroc`")));
+  }
+  const std::string mended = folder.file("mended.tum");
+  ASSERT_EQ(cairn({"convert", first, mended, "--from", "euroc"}).exit_code, 0);
+  EXPECT_NEAR(number(report_of({"evaluate", mended, truth}), "ate", "rotation"), 0.0, 1e-5);
+  EXPECT_THAT(cairn({"evaluate", truth, truth}).err, Not(HasSubstr("with w of")));
+}
+
 // Two metres ahead, then, turned to the left, one metre ahead: in a camera's axes, on a road that
 // rises by half a metre.
 TEST(EvaluateCommand, ACameraOnARoadIsComparedWithARobotOnAMap) {

@@ -10,6 +10,7 @@
 
 #include <fmt/core.h>
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "cairn/geometry/pose.hpp"
 #include "cairn/io/format.hpp"
@@ -131,6 +132,17 @@ Trajectory camera_to_robot_axes(Trajectory poses) {
     Eigen::Map<Vector3d> t(pose.t.data());
     R = (C.transpose() * R * C).eval();
     t = (C.transpose() * t).eval();
+  }
+  return poses;
+}
+
+Trajectory with_quaternions_of_order(Trajectory poses, bool w_first) {
+  for (TrajectoryPose& pose : poses) {
+    Eigen::Map<Matrix3d> R(pose.R.data());
+    const Eigen::Quaterniond q{Matrix3d(R)};
+    R = (w_first ? Eigen::Quaterniond(q.x(), q.y(), q.z(), q.w())
+                 : Eigen::Quaterniond(q.z(), q.w(), q.x(), q.y()))
+            .toRotationMatrix();
   }
   return poses;
 }

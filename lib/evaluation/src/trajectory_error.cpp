@@ -349,15 +349,10 @@ TrajectoryError compare(const Trajectory& estimate, const Trajectory& truth) {
   return compare(pair_by_id(estimate, truth));
 }
 
-namespace {
-
-/// `TrajectoryError::ate_rotation` alone [deg].
 double rotation_error(const TrajectoryPairs& poses) {
   const Pairs pairs = pairs_of(poses);
   return kDegrees * std::sqrt(absolute_errors(pairs).rotation / static_cast<double>(pairs.size()));
 }
-
-}  // namespace
 
 std::optional<CameraAxes> camera_axes_of_one(const TrajectoryPairs& pairs, double ate_rotation) {
   constexpr double kFar = 90.0, kShare = 0.1;  // [deg], of the error

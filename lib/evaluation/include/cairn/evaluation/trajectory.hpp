@@ -50,6 +50,9 @@ CAIRN_API Trajectory with_stamps(Trajectory poses, const std::vector<double>& st
 /// A trajectory whose world and body are a camera's (x right, y down, z forward), in a robot's (x
 /// forward, y left, z up): T becomes C⁻¹ T C, where C takes a robot's coordinates to a camera's.
 CAIRN_API Trajectory camera_to_robot_axes(Trajectory poses);
+/// The same of a file whose quaternions have w first, and were read as if it were last; with
+/// `w_first` false the reverse.
+CAIRN_API Trajectory with_quaternions_of_order(Trajectory poses, bool w_first);
 /// The same for the states of a graph without factors, whose measurements would be wrong after it:
 /// poses turn, points move. Throws `Error` (input) where it has factors, variables of the plane,
 /// which no camera's axes fit, or poses with more than a pose in their states.
@@ -156,5 +159,8 @@ CAIRN_API TrajectoryError compare(const TrajectoryPairs& pairs,
 CAIRN_API TrajectoryError compare(const Trajectory& estimate, const Trajectory& truth);
 /// `ate_translation` of that alone [m], in linear time.
 CAIRN_API double absolute_error(const Trajectory& estimate, const Trajectory& truth);
+/// How far the orientations are from those of the truth after `align` [deg], a root mean square:
+/// `TrajectoryError::ate_rotation` alone, in linear time.
+CAIRN_API double rotation_error(const TrajectoryPairs& pairs);
 
 }  // namespace cairn
