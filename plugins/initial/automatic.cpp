@@ -17,6 +17,7 @@
 #include "cairn/runtime/error.hpp"
 #include "guesses.hpp"
 #include "other_minima.hpp"
+#include "placing.hpp"
 #include "trial_losses.hpp"
 
 namespace cairn::initial {
@@ -108,7 +109,9 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
     /// "chordal (chi2 31.2)", "as_given (chi2 31.2, after 5 iterations 7.1)"
     std::string in_words() const {
       const std::string trial =
-          iterations > 0 ? fmt::format(", after {} iterations {:.4g}", iterations, reached) : "";
+          iterations > 0 ? fmt::format(", after {} {:.4g}",
+                                       counted(iterations, "iteration", "iterations"), reached)
+                         : "";
       return fmt::format("{} (chi2 {:.4g}{})", name, chi2, trial);
     }
   };

@@ -54,8 +54,6 @@ class ChordalPool {
     solve_translations(solver);
   }
 
-  std::int64_t relative_factors() const { return static_cast<std::int64_t>(links_.size()); }
-
  private:
   static constexpr int kNone = -1;
   static constexpr double kHeld = 1e-8;  // of the weight of what is measured
@@ -307,19 +305,14 @@ class Chordal final : public InitialGuess {
     Placing placing(graph);
     const Gauge gauge = resolve_gauge(graph);
     placing.place_roots(gauge);
-    std::int64_t relative = 0;
     for (std::size_t pool = 0; pool < graph.variable_pools().size(); ++pool) {
       const VariableType& type = *graph.variable_pools()[pool].type;
       if (!has_orientation(type)) continue;
-      relative += type.placement()->dimension() == 2
-                      ? compute_pool<2>(graph, placing, gauge, static_cast<int>(pool), notes)
-                      : compute_pool<3>(graph, placing, gauge, static_cast<int>(pool), notes);
-    }
-    const std::int64_t others = graph.factor_count() - relative;
-    if (others > 0) {
-      notes.push_back(counted(others, "factor that is not a relative pose was",
-                              "factors that are not relative poses were") +
-                      " not used for orientations");
+      if (type.placement()->dimension() == 2) {
+        compute_pool<2>(graph, placing, gauge, static_cast<int>(pool), notes);
+      } else {
+        compute_pool<3>(graph, placing, gauge, static_cast<int>(pool), notes);
+      }
     }
     placing.spread();
     placing.finish(notes);
@@ -328,11 +321,9 @@ class Chordal final : public InitialGuess {
 
  private:
   template <int D>
-  std::int64_t compute_pool(Graph& graph, Placing& placing, const Gauge& gauge, int pool,
-                            std::vector<std::string>& notes) {
-    ChordalPool<D> poses(graph, placing, gauge, pool, unit_weights_);
-    poses.compute(*solver_, notes);
-    return poses.relative_factors();
+  void compute_pool(Graph& graph, Placing& placing, const Gauge& gauge, int pool,
+                    std::vector<std::string>& notes) {
+    ChordalPool<D>(graph, placing, gauge, pool, unit_weights_).compute(*solver_, notes);
   }
 
   bool unit_weights_;

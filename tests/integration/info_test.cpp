@@ -134,6 +134,11 @@ TEST_F(InfoCommand, SuspectsAPriorOnAPartOfAnOrientationInSpace) {
               Not(HasSubstr("part of an orientation")));
   EXPECT_THAT(suspicions(info_of(pose + position + "0 0 0 0 0 0\n")),
               Not(HasSubstr("part of an orientation")));
+  const std::string orientation = position + "0 0 0 0 0 0\nEDGE_SE3_PRIORQUAT 4 1 0 0 0 ";
+  EXPECT_THAT(suspicions(info_of(pose + orientation + "9 0 0 9 0 0\n")),
+              HasSubstr("(first: EDGE_SE3_PRIORQUAT 4)"));
+  EXPECT_THAT(suspicions(info_of(pose + orientation + "9 0 0 9 0 9\n")),
+              Not(HasSubstr("part of an orientation")));
 }
 
 // Two unknown poses in a chain: H = JᵀJ with |det J| = 1 (two rigid motions), so that |H| is the

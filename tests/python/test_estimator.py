@@ -34,7 +34,7 @@ def test_converged_is_what_has_converged(name):
     separator = "," if ":" in name else ":"
     short = feed(cairn.Estimator(f"{name}{separator}iterations=1"), walk)
     assert not short[-1].converged
-    assert sum("not converged: max_iterations after 1 iterations" in note for report in short for note in report.notes) == 1
+    assert sum("not converged: max_iterations after 1 iteration" in note for report in short for note in report.notes) == 1
     assert all(report.converged for report in feed(cairn.Estimator(name), walk))
 
 

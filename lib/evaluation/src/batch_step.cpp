@@ -18,8 +18,9 @@ std::string report_batch_step(const Summary& summary, const Stop& stop,
   const bool goes_on = report.owed > 0 && summary.status == Status::max_iterations;
   report.converged = converged || (!options.full && (goes_on || is_estimate(summary, stop)));
   if (report.converged) return {};
-  return fmt::format("not converged: {} after {} iterations", to_string(summary.status),
-                     report.iterations);
+  return fmt::format(
+      "not converged: {} after {}", to_string(summary.status),
+      report.iterations == 1 ? "1 iteration" : fmt::format("{} iterations", report.iterations));
 }
 
 }  // namespace cairn

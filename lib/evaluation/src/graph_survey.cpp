@@ -119,7 +119,10 @@ void count_freedoms(const Graph& graph, GraphSurvey& s) {
 
 void suspect_structure(const Graph& graph, GraphSurvey& s) {
   const auto say = [&](std::string sentence) { s.suspicions.push_back(std::move(sentence)); };
-  if (graph.factor_count() == 0) say("there are no factors: nothing to optimise");
+  if (graph.factor_count() == 0) {
+    say("there are no factors: nothing to optimise");
+    return;
+  }
   if (!s.gauge.unconstrained.empty()) {
     say(fmt::format("{} without any factor; the first is {}",
                     counted(std::ssize(s.gauge.unconstrained), "variable"),
@@ -141,12 +144,14 @@ void suspect_structure(const Graph& graph, GraphSurvey& s) {
   }
 }
 
-/// How many of the three numbers of an orientation in space a prior on a pose measures; none where
-/// it is another kind of factor.
+constexpr std::string_view kOrientation = "EDGE_SE3_PRIORQUAT";
+
+/// How many of the three numbers of an orientation in space a prior on a pose, or on its
+/// orientation alone, measures; none where it is another kind of factor.
 int turns_measured(const Graph& graph, int position) {
   const FactorType& type = graph.factor_type(position);
   constexpr int kPose = 6, kTurns = 3;
-  if (type.arity() != 1 || type.residual_size() != kPose) return 0;
+  if (type.arity() != 1 || (type.residual_size() != kPose && type.tag() != kOrientation)) return 0;
   const VariableType& pose = graph.type(graph.factor_variables(position)[0]);
   if (pose.tangent_size() != kPose || !has_orientation(pose) ||
       pose.placement()->dimension() != kTurns)

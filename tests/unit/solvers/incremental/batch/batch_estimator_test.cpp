@@ -83,7 +83,7 @@ TEST_F(BatchEstimators, SayWhereABatchStepHasNotConverged) {
       EXPECT_TRUE(report.ok);
       EXPECT_FALSE(report.converged) << one << ' ' << k;
     }
-    constexpr const char* kWhy = "not converged: max_iterations after 1 iterations";
+    constexpr const char* kWhy = "not converged: max_iterations after 1 iteration";
     EXPECT_EQ(std::ranges::count(notes, kWhy), 1) << "once; a full update repeats it";
     GraphUpdate loop;
     loop.factors.push_back({types_.relative_pose, {0, 5}, {0.5, 2.0, -2.5}, kUnit});
