@@ -33,8 +33,10 @@ constexpr double kSure = 1e-6;
 constexpr double kResolved = 1e-6;
 /// A direction is free where its eigenvalue of the scaled H is below this.
 constexpr double kFree = 1e-13;
-/// Information below this part of the largest of all is none.
-constexpr double kNothing = 1e-28;
+/// A number below this part of the largest of its row is rounding.
+constexpr double kNothing = 1e-14;
+/// The squares of smaller numbers vanish.
+constexpr double kVanishing = 1e-150;
 /// What a factor says of a direction is rounding below this part of what all say of its variables.
 constexpr double kBarely = 1e-18;
 /// Of scaled Gram matrices: what is smaller is rounding.
@@ -43,6 +45,20 @@ constexpr double kRounding = 1e-14;
 constexpr int kMostParameters = 100;
 /// What a basis vector has below this part of its largest number is rounding.
 constexpr double kNoMove = 1e-9;
+
+/// Divides each row by its largest number: how much a row weighs says nothing of what it leaves
+/// free, and where rows differ by many orders of magnitude the weak ones are measurements still.
+void equilibrate(MatrixXd& J) {
+  for (Eigen::Index row = 0; row < J.rows(); ++row) {
+    const double largest = J.row(row).cwiseAbs().maxCoeff();
+    if (largest > kVanishing) {
+      J.row(row) =
+          (J.row(row).array().abs() > kNothing * largest).select(J.row(row).array() / largest, 0.0);
+    } else {
+      J.row(row).setZero();
+    }
+  }
+}
 
 /// How a variable moves with one parameter.
 struct Column {
@@ -186,7 +202,8 @@ class Search {
     return columns;
   }
 
-  /// J of a factor. False if it has numbers that are not finite: then the search is given up.
+  /// J of a factor, each row divided by its largest number. False if it has numbers that are not
+  /// finite: then the search is given up.
   bool evaluate(std::int32_t k) {
     const int factor = factors_[static_cast<std::size_t>(k)];
     int columns = 0;
@@ -196,6 +213,7 @@ class Search {
     rows_.jacobian(factor, {J_.data(), static_cast<std::size_t>(J_.size())});
     finite_ = J_.allFinite();
     complete_ = complete_ && finite_;
+    if (complete_) equilibrate(J_);
     return complete_;
   }
 
@@ -419,9 +437,7 @@ class Search {
       largest = std::max(largest, diagonal_[v].maxCoeff());
     }
     for (VectorXd& of : diagonal_)
-      of = of.unaryExpr([&](double d) {
-        return d > kNothing * largest ? d : largest > 0.0 ? largest : 1.0;
-      });
+      of = of.unaryExpr([&](double d) { return d > 0.0 ? d : largest > 0.0 ? largest : 1.0; });
   }
 
   /// Those α of a part that no row sees, each with as many zeros as elimination gives it.
