@@ -161,6 +161,11 @@ CeresOptimizer::CeresOptimizer(ceres::Solver::Options options, CeresLoss loss)
 }
 
 Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& observer) {
+  return with_departures(graph, stop, observer,
+                         [this](Graph& g, const Stop& s, Observer& o) { return run(g, s, o); });
+}
+
+Summary CeresOptimizer::run(Graph& graph, const Stop& stop, Observer& observer) const {
   check(stop);
   if (graph.has_losses() && loss_.name != "none") {
     throw Error(
@@ -183,8 +188,8 @@ Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& obser
   Bridge bridge(graph, values, problem.cost_scale(), stop, observer, summary);
   ceres::Solver::Options options = options_;
   set_limits(stop, options);
-  options.parameter_tolerance =
-      parameter_tolerance(stop, values, state_extent(graph, gauge, values));
+  const double extent = state_extent(graph, gauge, values);  // may be zero at the end
+  options.parameter_tolerance = parameter_tolerance(stop, values, extent);
   options.callbacks.push_back(&bridge);
   ceres::Solver::Summary report;
   {
@@ -210,7 +215,7 @@ Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& obser
     const NewtonStep left = NewtonDecrement(graph, gauge).at(graph.values());
     if (left.decrease > kCeresRounding * summary.final_chi2 &&
         find_free_directions(graph, gauge, graph.values()).empty() &&
-        left.norm > kCeresRounding * state_extent(graph, gauge, graph.values())) {
+        left.norm > kCeresRounding * std::max(extent, state_extent(graph, gauge, graph.values()))) {
       summary.status = Status::diverged;
       summary.doubt(
           fmt::format("Ceres took a short step for convergence, but the model predicts a decrease "

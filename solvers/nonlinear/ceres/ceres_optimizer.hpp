@@ -19,6 +19,8 @@ class CeresOptimizer final : public Optimizer {
   Summary optimize(Graph& graph, const Stop& stop, Observer& observer) override;
 
  private:
+  Summary run(Graph& graph, const Stop& stop, Observer& observer) const;
+
   ceres::Solver::Options options_;
   CeresLoss loss_;
 };

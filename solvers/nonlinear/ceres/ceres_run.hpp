@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <string_view>
 
 #include <ceres/iteration_callback.h>
@@ -41,5 +42,10 @@ bool ends_at_once(const Graph& graph, const Gauge& gauge, const Stop& stop, Obse
 
 /// Begins where all residuals have a meaning, with a note, if that lowers chi2 (`enter_domains`).
 void begin_inside(const Graph& graph, const Gauge& gauge, Values& values, Summary& summary);
+
+/// Runs `once`, and again from beside stationary factors where a run has converged at some
+/// (`Departures`), as one optimisation; the best estimate stays.
+Summary with_departures(Graph& graph, const Stop& stop, Observer& observer,
+                        const std::function<Summary(Graph&, const Stop&, Observer&)>& once);
 
 }  // namespace cairn

@@ -271,6 +271,11 @@ LineSearchOptimizer::LineSearchOptimizer(const LineSearchOptions& options)
 }
 
 Summary LineSearchOptimizer::optimize(Graph& graph, const Stop& stop, Observer& observer) {
+  return with_departures(graph, stop, observer,
+                         [this](Graph& g, const Stop& s, Observer& o) { return run(g, s, o); });
+}
+
+Summary LineSearchOptimizer::run(Graph& graph, const Stop& stop, Observer& observer) const {
   check(stop);
   const Clock::time_point begin = Clock::now();
   const Gauge gauge = resolve_gauge(graph);

@@ -28,6 +28,8 @@ class LineSearchOptimizer final : public Optimizer {
   Summary optimize(Graph& graph, const Stop& stop, Observer& observer) override;
 
  private:
+  Summary run(Graph& graph, const Stop& stop, Observer& observer) const;
+
   LineSearchOptions options_;
   ceres::Solver::Options ceres_;
 };

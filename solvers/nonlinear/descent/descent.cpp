@@ -32,6 +32,8 @@ constexpr double kLargestResidual = 0.1;
 constexpr double kGradientRounding = 1e-13;
 /// What may be left when no step lowers chi2: of chi2, and of the states.
 constexpr double kRounding = 1e-6;
+/// So many times what rounding of the coordinates makes of chi2 a residual of zero may be.
+constexpr double kCancelled = 100.0;
 /// What rounding of the coordinates makes of chi2 is worth a note above this.
 constexpr double kNoticeable = 1e-3;
 
@@ -102,6 +104,13 @@ Descent::Descent(std::string optimizer, std::string linear_solver, LinearSolver&
     chi2 = summary_.initial_chi2 = equations_->linearize(estimate);
     begin_inside();
     if (std::isfinite(chi2)) find_free();
+    // Where a residual answers to no small motion, what it measures seems to be free.
+    if (!free_.empty() &&
+        departures_.depart_at_start(
+            graph, equations_->gauge().held, chi2,
+            [&](const Values& values) { return equations_->chi2(values); }, estimate)) {
+      linearize();
+    }
   }
   state_extent_ = cairn::state_extent(graph, equations_->gauge(), estimate);
   best_ = estimate;
@@ -141,6 +150,18 @@ void Descent::linearize() {
 Factorization Descent::factorize() {
   return free_space_.empty() ? equations_->factorize()
                              : equations_->factorize_pinned(free_space_.pins());
+}
+
+bool Descent::begins_anew() {
+  if (status_ != Status::converged || exact() || equations_->size() == 0) return false;
+  trial = best_;
+  if (!departures_.depart(graph_, equations_->gauge().held, best_chi2_, trial)) return false;
+  std::swap(estimate, trial);
+  linearize();
+  if (!std::isfinite(chi2)) return false;
+  keep_if_best();
+  status_.reset();
+  return true;
 }
 
 bool Descent::next_iteration() {
@@ -360,8 +381,11 @@ void Descent::end_undetermined() {
 
 Summary Descent::finish() {
   summary_.status = status_.value_or(Status::max_iterations);
+  std::string departed = departures_.conclude(graph_, best_chi2_, chi2, summary_.status);
+  if (!departed.empty()) note(std::move(departed));
   summary_.final_chi2 = best_chi2_;
-  if (summary_.status == Status::converged && chi2 > best_chi2_ * (1.0 + 1e-6)) {
+  if (summary_.status == Status::converged &&
+      chi2 > best_chi2_ * (1.0 + kRounding) + kCancelled * coordinate_rounding()) {
     note(fmt::format("converged at chi2 {:.9g}; kept a better estimate of an earlier iteration",
                      chi2));
   }

@@ -12,6 +12,7 @@
 #include "cairn/solve/optimizer.hpp"
 #include "free_space.hpp"
 #include "state_extent.hpp"
+#include "stationary_factors.hpp"
 
 namespace cairn {
 
@@ -57,6 +58,10 @@ class Descent {
 
   /// False when the run has ended or a limit is reached. Otherwise a new iteration begins.
   bool next_iteration();
+  /// Whether the run, having ended as converged, is to go on: at its best estimate factors were
+  /// stationary that are at no minimum (`leave_stationary_factors`), and the estimate is beside it
+  /// now. Goes on from it as from an initial one; the better of both ends stays.
+  bool begins_anew();
   /// Whether this is the last iteration that the limit allows: no need to linearise after it.
   bool last_iteration() const { return number_ >= stop_.max_iterations; }
   /// Checks the interrupt flag and the clock, between the parts of an iteration; ends the run if it
@@ -157,6 +162,7 @@ class Descent {
   FreeSpace free_space_;
   Values best_;
   double best_chi2_ = 0.0;
+  Departures departures_;
   int number_ = 0;
   double state_extent_ = 0.0;
   double step_norm_ = 0.0;

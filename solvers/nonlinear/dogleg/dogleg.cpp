@@ -134,8 +134,10 @@ Dogleg::Dogleg(std::unique_ptr<LinearSolver> solver, DoglegOptions options)
 
 Summary Dogleg::optimize(Graph& graph, const Stop& stop, Observer& observer) {
   Descent descent("dogleg", options_.linear_solver, *solver_, graph, stop, observer);
-  Run run(descent, options_);
-  while (descent.next_iteration()) run.iterate();
+  do {
+    Run run(descent, options_);
+    while (descent.next_iteration()) run.iterate();
+  } while (descent.begins_anew());
   return descent.finish();
 }
 

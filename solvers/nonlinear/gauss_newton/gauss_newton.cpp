@@ -24,19 +24,14 @@ void end_diverged(Descent& run) {
   run.end(Status::diverged);
 }
 
-}  // namespace
-
-GaussNewton::GaussNewton(std::unique_ptr<LinearSolver> solver, GaussNewtonOptions options)
-    : solver_(std::move(solver)), options_(std::move(options)) {}
-
-Summary GaussNewton::optimize(Graph& graph, const Stop& stop, Observer& observer) {
-  Descent run("gauss_newton", options_.linear_solver, *solver_, graph, stop, observer);
-  Convergence convergence(stop.tolerance);
+/// One run, from the present estimate.
+void descend(Descent& run, LinearSolver& solver, int most_rises) {
+  Convergence convergence(run.stop().tolerance);
   Acceleration acceleration;
   NormalEquations& equations = run.equations();
   bool best = true;
   int rises = 0;
-  const bool regular = run.free().empty() || query<IterativeSolver>(*solver_);
+  const bool regular = run.free().empty() || query<IterativeSolver>(solver);
   while (run.next_iteration()) {
     if (!regular) {
       run.end_undetermined();
@@ -72,13 +67,25 @@ Summary GaussNewton::optimize(Graph& graph, const Stop& stop, Observer& observer
     rises = run.chi2 > before ? rises + 1 : 0;
     const bool exhausted = convergence.exhausted(best, step_norm, run.state_extent());
     if (!std::isfinite(run.chi2) ||
-        (!run.exact() && !arrived && !exhausted && rises >= options_.rises)) {
+        (!run.exact() && !arrived && !exhausted && rises >= most_rises)) {
       end_diverged(run);
     } else if (arrived || exhausted) {
       run.end(Status::converged);
     }
     run.record(step_norm, 0.0, true);
   }
+}
+
+}  // namespace
+
+GaussNewton::GaussNewton(std::unique_ptr<LinearSolver> solver, GaussNewtonOptions options)
+    : solver_(std::move(solver)), options_(std::move(options)) {}
+
+Summary GaussNewton::optimize(Graph& graph, const Stop& stop, Observer& observer) {
+  Descent run("gauss_newton", options_.linear_solver, *solver_, graph, stop, observer);
+  do {
+    descend(run, *solver_, options_.rises);
+  } while (run.begins_anew());
   return run.finish();
 }
 

@@ -214,8 +214,10 @@ LevenbergMarquardt::LevenbergMarquardt(std::unique_ptr<LinearSolver> solver,
 
 Summary LevenbergMarquardt::optimize(Graph& graph, const Stop& stop, Observer& observer) {
   Descent descent("levenberg_marquardt", options_.linear_solver, *solver_, graph, stop, observer);
-  Run run(descent, options_);
-  while (descent.next_iteration()) run.iterate();
+  do {
+    Run run(descent, options_);
+    while (descent.next_iteration()) run.iterate();
+  } while (descent.begins_anew());
   return descent.finish();
 }
 
