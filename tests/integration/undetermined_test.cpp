@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What the measurements do not determine is named, in the same words by every command.
+#include <sstream>
 #include <string>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -99,7 +101,8 @@ TEST_F(Undetermined, HasNoCovariances) {
   for (const char* text : {kHeight, kBearing}) {
     const Outcome outcome = cairn({"marginals", file(text)});
     EXPECT_EQ(outcome.exit_code, 4);
-    EXPECT_THAT(unwrapped(outcome.err), HasSubstr("it stays at the initial estimate"));
+    EXPECT_THAT(unwrapped(outcome.err), HasSubstr(" is free along "));
+    EXPECT_THAT(unwrapped(outcome.err), Not(HasSubstr("initial estimate")));
   }
 }
 
@@ -109,6 +112,58 @@ TEST_F(Undetermined, NamesPosesThatTurnTogether) {
                 HasSubstr("the 4 poses after 295 can turn about it; a prior or one more "
                           "measurement holds them"))
         << command;
+  }
+}
+
+/// Poses along (0.6, 0.8, 0), of which two are turned, each with a measured position.
+TEST_F(Undetermined, NamesTheLineAboutWhichPosesTurn) {
+  const std::string text =
+      "VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT 1 0.6 0.8 0 0 0 1 0\n"
+      "VERTEX_SE3:QUAT 2 1.2 1.6 0 1 0 0 0\n"
+      "EDGE_SE3:QUAT 0 1 0.6 0.8 0 0 0 1 0 100 0 0 0 0 0 100 0 0 0 0 100 0 0 0 400 0 0 400 0 400\n"
+      "EDGE_SE3:QUAT 1 2 -0.6 -0.8 0 0 1 0 0 100 0 0 0 0 0 100 0 0 0 0 100 0 0 0 400 0 0 400 0 "
+      "400\n"
+      "EDGE_SE3_PRIORXYZ 0 0 0 0 100 0 0 100 0 100\n"
+      "EDGE_SE3_PRIORXYZ 2 1.2 1.6 0 100 0 0 100 0 100\n";
+  EXPECT_THAT(unwrapped(cairn({"info", file(text)}).out),
+              HasSubstr("all 3 poses can turn about the line through pose 0 along (0.6, 0.8, 0); a "
+                        "prior or one more measurement holds them"));
+}
+
+/// A map in space with one altitude is shifted, not tilted.
+TEST_F(Undetermined, StaysAsItWasWhereOneAltitudeIsMeasured) {
+  std::string text;
+  const int places[][2] = {{0, 0}, {1, 0}, {2, 0}, {2, 1}, {2, 2}};
+  for (int k = 0; k < 5; ++k) {
+    const auto [x, y] = places[k];
+    text += fmt::format("VERTEX_SE3:QUAT {} {} {} 0 0 0 0 1\n", k, x, y);
+    if (k == 0) continue;
+    text += fmt::format(
+        "EDGE_SE3:QUAT {} {} {} {} 0 0 0 0 1 100 0 0 0 0 0 100 0 0 0 0 100 0 0 0 400 0 0 400 0 "
+        "400\n",
+        k - 1, k, x - places[k - 1][0], y - places[k - 1][1]);
+  }
+  text += "EDGE_SE3_PRIORXYZ 4 0 0 1 0 0 0 0 0 100\n";
+  for (const char* optimizer : {"levenberg_marquardt", "dogleg"}) {
+    SCOPED_TRACE(optimizer);
+    const std::string out = folder_.file("out.g2o");
+    const Outcome outcome = cairn(
+        {"optimize", file(text), "--optimizer", optimizer, "--initial", "as_given", "-o", out});
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    EXPECT_THAT(outcome.out, Not(HasSubstr("does not solve")));
+    std::istringstream lines(read_text(out));
+    std::string tag;
+    for (int k = 0; k < 5; ++k) {
+      int id = -1;
+      double x[7];
+      while (lines >> tag && tag != "VERTEX_SE3:QUAT") {
+      }
+      lines >> id;
+      for (double& number : x) lines >> number;
+      ASSERT_TRUE(lines) << k;
+      const double expected[] = {double(places[id][0]), double(places[id][1]), 1, 0, 0, 0, 1};
+      for (int c = 0; c < 7; ++c) EXPECT_NEAR(x[c], expected[c], 1e-5) << id << " " << c;
+    }
   }
 }
 

@@ -746,10 +746,17 @@ bool has_cameras(const Graph& graph) {
   });
 }
 
+FreeDirections given_up() {
+  FreeDirections nothing;
+  nothing.complete = false;
+  return nothing;
+}
+
 }  // namespace
 
 FreeDirections find_free_directions(const Graph& graph, const Gauge& gauge, const Values& values) {
-  if (has_cameras(graph) || all_are_whole_relative_poses(graph, gauge)) return {};
+  if (has_cameras(graph)) return given_up();
+  if (all_are_whole_relative_poses(graph, gauge)) return {};
   const std::vector<bool> determined = determined_by_whole_relative_poses(graph, gauge.held);
   const std::vector<std::int32_t> factors = factors_on_others(graph, determined);
   if (factors.empty()) return {};

@@ -279,20 +279,47 @@ bool shifts(const Graph& graph, const FreeDirection& direction) {
   return shift && shift->norm() > 0.0;
 }
 
-/// The point of the plane about which a direction turns all, if it does.
-std::optional<Vector3d> centre_in_plane(const Graph& graph, const FreeDirection& direction) {
+/// What a direction turns all about: a point of the plane, or a line in space, by its point that is
+/// nearest to the first pose.
+struct Axis {
+  Vector3d point, along;
+};
+
+std::optional<Axis> axis_of_turn(const Graph& graph, const FreeDirection& direction) {
   for (const FreeMove& move : direction.moves) {
     const VariableType& type = graph.type(move.variable);
-    if (!is_pose(type) || type.placement()->dimension() != 2) continue;
-    const std::optional<Motion> motion = motion_of(graph, move);
-    if (!(motion->turn.norm() > 0.0)) return std::nullopt;
-    const Vector3d shift = motion->shift / motion->turn[2];
-    const Vector3d centre =
-        place_of(type, graph.state(move.variable).data())->t + Vector3d(-shift[1], shift[0], 0.0);
-    if (turns_about(graph, direction, centre)) return centre;
-    return std::nullopt;
+    if (!is_pose(type)) continue;
+    const Motion motion = *motion_of(graph, move);
+    const double square = motion.turn.squaredNorm();
+    if (!(square > 0.0)) return std::nullopt;
+    const Vector3d at = place_of(type, graph.state(move.variable).data())->t;
+    const Axis axis{at + motion.turn.cross(motion.shift) / square, motion.turn};
+    return turns_about(graph, direction, axis.point) ? std::optional(axis) : std::nullopt;
   }
   return std::nullopt;
+}
+
+/// "can turn about pose 0", "can turn about the line through (1, 2, 0) along (1, 0, 0)".
+std::string turn_text(const Graph& graph, const Axis& axis, const std::set<int>& variables) {
+  const bool planar = graph.type(*variables.begin()).placement()->dimension() == 2;
+  std::string through;
+  for (const int v : variables) {
+    const auto there = place_of(graph.type(v), graph.state(v).data());
+    if (!there) continue;
+    const Vector3d arm = there->t - axis.point;
+    const Vector3d off = planar ? arm : Vector3d(axis.along.normalized().cross(arm));
+    if (off.norm() > kSame * (1.0 + axis.point.norm())) continue;
+    through = name_of(graph, v);
+    break;
+  }
+  const Vector3d& p = axis.point;
+  if (through.empty()) {
+    through = planar ? fmt::format("({:.4g}, {:.4g})", p[0], p[1])
+                     : fmt::format("({:.4g}, {:.4g}, {:.4g})", p[0], p[1], p[2]);
+  }
+  if (planar) return "can turn about " + through;
+  return fmt::format("can turn about the line through {} along {}", through,
+                     direction_text(axis.along, 3));
 }
 
 std::string group_name(const Graph& graph, const std::set<int>& variables,
@@ -330,16 +357,10 @@ std::string group_text(const Graph& graph, const Together& together) {
   if (what.empty() && all([&](const FreeDirection& d) { return shifts(graph, d); }))
     what = "can shift";
   if (what.empty() && together.directions.size() == 1) {
-    if (const auto centre = centre_in_plane(graph, *together.directions.front())) {
-      what = fmt::format("can turn about ({:.4g}, {:.4g})", (*centre)[0], (*centre)[1]);
+    if (const auto axis = axis_of_turn(graph, *together.directions.front())) {
       std::set<int> all_there = around;
       all_there.insert(together.variables.begin(), together.variables.end());
-      for (const int v : all_there) {
-        const auto there = place_of(graph.type(v), graph.state(v).data());
-        if (!there || (there->t - *centre).norm() > kSame * (1.0 + centre->norm())) continue;
-        what = "can turn about " + name_of(graph, v);
-        break;
-      }
+      what = turn_text(graph, *axis, all_there);
     }
   }
   if (what.empty()) {
@@ -373,7 +394,7 @@ std::vector<Together> groups(std::span<const FreeDirection> directions) {
 
 }  // namespace
 
-std::string FreeDirections::describe(const Graph& graph) const {
+std::string FreeDirections::describe(const Graph& graph, bool estimated) const {
   std::map<int, std::vector<const FreeMove*>> single;
   for (const FreeDirection& direction : directions) {
     if (direction.moves.size() == 1)
@@ -394,8 +415,9 @@ std::string FreeDirections::describe(const Graph& graph) const {
                               ? "is one more variable"
                               : fmt::format("are {} more variables", single.size() - names.size()));
     }
-    sentences.push_back(text + (single.size() == 1 ? "; it stays at the initial estimate"
-                                                   : "; they stay at the initial estimate"));
+    if (estimated) text += single.size() == 1 ? "; it stays" : "; they stay";
+    if (estimated) text += " at the initial estimate";
+    sentences.push_back(std::move(text));
   }
   const std::vector<Together> together = groups(directions);
   for (std::size_t k = 0; k < std::min(together.size(), kNamed); ++k)

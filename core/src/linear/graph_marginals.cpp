@@ -75,7 +75,7 @@ std::string GraphMarginals::explain(const Factorization& failure) const {
   if (!free_.empty()) {
     const auto count = std::ssize(free_.directions);
     return fmt::format("H is not positive definite: {} gauge freedom{} likely; {}", count,
-                       count == 1 ? " is" : "s are", free_.describe(*graph_));
+                       count == 1 ? " is" : "s are", free_.describe(*graph_, false));
   }
   if (!singular_) return equations_.explain(failure);
   const int free = equations_.free_directions();

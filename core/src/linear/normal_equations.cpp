@@ -177,14 +177,19 @@ std::string NormalEquations::explain(const Factorization& failure) const {
                    [](double v) { return std::isfinite(v); })) {
     return text + "; H holds values that are not finite";
   }
-  if (const int free = free_directions(); free > 0) {
+  const FreeDirections left_free = find_free_directions(*graph_, gauge_, graph_->values());
+  const bool all_measured = left_free.complete && left_free.empty() && gauge_.left_free.empty();
+  if (const int free = free_directions(); free > 0 && !all_measured)
     text += fmt::format("; {} gauge freedom{} likely", free, free == 1 ? " is" : "s are");
-  }
   if (diagonal_block(H_, block).isZero(0.0)) {
     text += fmt::format(
         "; no factor of {} has any weight (is its information zero, or has the loss switched it "
         "off?)",
         name);
+  } else if (all_measured) {
+    text +=
+        "; all directions are measured, some so weakly that rounding of the others leaves nothing "
+        "of them in H: linear solver spqr works without H";
   } else if (const int free = free_directions_of_block(H_, block); free > 0) {
     text += fmt::format("; the factors of {} leave {} of its {} directions free", name, free,
                         linearizer_.structure().block_size(block));
@@ -195,10 +200,7 @@ std::string NormalEquations::explain(const Factorization& failure) const {
         "; only {} is constant in its component, which does not determine its rotation: fix a pose",
         held);
   }
-  if (const std::string free =
-          find_free_directions(*graph_, gauge_, graph_->values()).describe(*graph_);
-      !free.empty())
-    text += "; " + free;
+  if (!left_free.empty()) text += "; " + left_free.describe(*graph_);
   return text;
 }
 

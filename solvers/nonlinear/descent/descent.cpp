@@ -209,7 +209,10 @@ void Descent::record(double step_norm, double lambda, bool accepted) {
 
 bool Descent::solve(std::span<double> out) {
   equations_->solve(out);
-  free_space_.project(out);
+  if (!free_space_.empty()) {
+    solution_.assign(out.begin(), out.end());
+    free_space_.project(out);
+  }
   step_norm_ = norm(out);
   if (!std::isfinite(step_norm_)) return false;
   if (number_ != sampled_ && is_sampled(number_) && !query<IterativeSolver>(solver_)) {
@@ -220,7 +223,7 @@ bool Descent::solve(std::span<double> out) {
 }
 
 bool Descent::is_solution(std::span<const double> out) {
-  const double error = equations_->backward_error(out);
+  const double error = equations_->backward_error(free_space_.empty() ? out : solution_);
   if (query<IterativeSolver>(solver_)) {
     const double left = relative_residual();
     if (left <= kLargestResidual || residual_is_rounding()) return true;

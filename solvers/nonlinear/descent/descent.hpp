@@ -166,7 +166,8 @@ class Descent {
   int number_ = 0;
   double state_extent_ = 0.0;
   double step_norm_ = 0.0;
-  int sampled_ = 0;                   // the last iteration whose step was checked
+  std::vector<double> solution_;  // the last one as solved, where the step leaves something alone
+  int sampled_ = 0;               // the last iteration whose step was checked
   bool reported_wrong_step_ = false;  // a note names the linear solver
   std::optional<Status> status_;
   Summary summary_;

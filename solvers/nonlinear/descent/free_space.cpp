@@ -9,6 +9,14 @@
 namespace cairn {
 namespace {
 
+/// A turn by one radian counts as much as a shift by so many units, in units of the measurements:
+/// more than the extent of a map.
+constexpr double kStiffRotation = 1e6;
+
+bool has_orientation(const VariableType& type) {
+  return type.placement() && type.placement()->has_orientation();
+}
+
 /// Modified Gram-Schmidt, twice.
 void orthonormalise(Eigen::MatrixXd& V) {
   for (Eigen::Index j = 0; j < V.cols(); ++j) {
@@ -29,13 +37,12 @@ FreeSpace::FreeSpace(const Graph& graph, const FreeDirections& free, const Linea
   for (const double entry : diagonal) largest = std::max(largest, entry);
   if (!(largest > 0.0)) largest = 1.0;
   pins_.assign(diagonal.size(), 0.0);
-  metric_.assign(diagonal.size(), 0.0);
   std::map<int, std::vector<const FreeDirection*>> by_part;
   for (const FreeDirection& direction : free.directions)
     by_part[direction.part].push_back(&direction);
   for (const auto& [number, directions] : by_part) {
     Part part;
-    std::vector<double> roots;
+    std::vector<double> roots, least;
     std::map<std::int64_t, Eigen::Index> place;
     for (const FreeDirection* direction : directions) {
       for (const FreeMove& move : direction->moves) {
@@ -51,13 +58,14 @@ FreeSpace::FreeSpace(const Graph& graph, const FreeDirections& free, const Linea
                                                           static_cast<std::size_t>(of_one))
                                        : diagonal.subspan(static_cast<std::size_t>(first + of_one),
                                                           static_cast<std::size_t>(n - of_one));
-          roots.push_back(std::sqrt(std::max(std::ranges::max(unit), 1e-14 * largest)));
+          least.push_back(std::max(std::ranges::max(unit), 1e-14 * largest));
+          const bool turns = k >= of_one && has_orientation(graph.type(move.variable));
+          roots.push_back(std::sqrt(least.back()) * (turns ? kStiffRotation : 1.0));
         }
       }
     }
     part.root = Eigen::Map<const Eigen::VectorXd>(roots.data(), std::ssize(roots));
-    for (std::size_t k = 0; k < roots.size(); ++k)
-      metric_[static_cast<std::size_t>(part.rows[k])] = roots[k] * roots[k];
+    part.least = Eigen::Map<const Eigen::VectorXd>(least.data(), std::ssize(least));
     part.V = Eigen::MatrixXd::Zero(std::ssize(part.rows), std::ssize(directions));
     for (std::size_t j = 0; j < directions.size(); ++j) {
       for (const FreeMove& move : directions[j]->moves) {
@@ -85,7 +93,7 @@ void FreeSpace::pin(const Part& part, std::span<const double> diagonal) {
     V.col(j).swap(V.col(j + column));
     for (Eigen::Index c = j + 1; c < V.cols(); ++c) V.col(c) -= V(row, c) / V(row, j) * V.col(j);
     const auto at = static_cast<std::size_t>(part.rows[static_cast<std::size_t>(row)]);
-    pins_[at] = std::max(diagonal[at], part.root[row] * part.root[row]);
+    pins_[at] = std::max(diagonal[at], part.least[row]);
   }
 }
 

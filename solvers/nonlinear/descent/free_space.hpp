@@ -25,25 +25,24 @@ class FreeSpace {
   /// What makes H regular when it is added to its diagonal: a number at as many unknowns as the
   /// space has dimensions, zero elsewhere.
   std::span<const double> pins() const { return pins_; }
-  /// That metric, which damping needs to have as well, or it would move what is free: an entry for
-  /// each unknown of a variable that is free in part, zero elsewhere. Empty where nothing is free.
-  std::span<const double> metric() const { return metric_; }
   /// Takes out of a step what lies in the space, in a metric that weighs all numbers of a variable
-  /// in one unit by the largest of them on H's diagonal: so a landmark moves along what is measured
-  /// of it alone.
+  /// in one unit by the largest of them on H's diagonal, so that a landmark moves along what is
+  /// measured of it alone, and rotations of poses far more, so that a map with one altitude is
+  /// shifted and not tilted. What factors see of the step stays the same.
   void project(std::span<double> step) const;
 
  private:
   /// Directions that share variables: V orthonormal in that metric.
   struct Part {
     std::vector<std::int64_t> rows;
-    Eigen::VectorXd root;  ///< of the metric
+    Eigen::VectorXd root;   ///< of the metric
+    Eigen::VectorXd least;  ///< of pins
     Eigen::MatrixXd V;
   };
   void pin(const Part& part, std::span<const double> diagonal);
 
   std::vector<Part> parts_;
-  std::vector<double> pins_, metric_;
+  std::vector<double> pins_;
 };
 
 }  // namespace cairn

@@ -47,6 +47,7 @@ class Run {
     }
     const double radius = radius_;
     const DoglegPath::Step step = arrived ? path_.end(run_.step) : path_.at(radius, run_.step);
+    run_.free_space().project(run_.step);
     double step_norm = norm(run_.step);
     if (!std::isfinite(step_norm)) {
       run_.doubt("the step is not finite");

@@ -113,9 +113,6 @@ class Run {
     for (std::size_t k = 0; k < damped_by_.size(); ++k) {
       damped_by_[k] = lambda * std::max(diagonal[k], min_diagonal_[k]);
     }
-    const std::span<const double> metric = run_.free_space().metric();
-    for (std::size_t k = 0; k < metric.size(); ++k)
-      damped_by_[k] = std::max(damped_by_[k], lambda * metric[k]);
     return lambda > 0.0 ? equations_.factorize_damped(damped_by_) : run_.factorize();
   }
 

@@ -38,8 +38,8 @@ struct CAIRN_API FreeDirections {
   bool empty() const { return directions.empty(); }
   /// One sentence that names variables and directions, at the graph's states, such as
   /// "VERTEX_XY 2 is free along its bearing from pose 7; it stays at the initial estimate".
-  /// Empty where nothing is free.
-  std::string describe(const Graph& graph) const;
+  /// Empty where nothing is free. `estimated`: whether to say what becomes of the estimate.
+  std::string describe(const Graph& graph, bool estimated = true) const;
 };
 
 /// Whitened rows J of factors, as the search below reads them. Factors are numbered from 0, and
