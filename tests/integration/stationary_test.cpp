@@ -127,8 +127,8 @@ TEST_F(Stationary, MinimumWithAContradictionIsOneWithoutADoubt) {
 
 TEST_F(Stationary, LandmarksAreMovedOnline) {
   const std::string lines = seen_from_within("100", "100") + "SOLVE\nFULL\nCHI2\nQUIT\n";
-  for (const char* estimator :
-       {"batch", "periodic_batch", "incremental_cholesky", "incremental_qr"}) {
+  for (const char* estimator : {"batch", "periodic_batch", "incremental_cholesky", "incremental_qr",
+                                "ekf", "eif", "seif"}) {
     if (!Registry().has("estimator", estimator)) continue;
     const Outcome outcome =
         cairn({"online", "--estimator", estimator, "--solve", "explicit"}, {}, lines);

@@ -112,6 +112,41 @@ Rows LinearizedEstimator::State::linearize(int factor, bool at_origins) const {
   return rows;
 }
 
+/// Puts a variable of that factor where it sees it, if it is the variable's only one and its model
+/// says nothing of it where it is, as of a landmark in the pose that saw it.
+void LinearizedEstimator::State::place_unseen(int factor, bool at_origins) {
+  const Rows rows = models[static_cast<std::size_t>(factor)].rows;
+  if (rows.c.isZero(0.0)) return;
+  const auto on = graph.factor_variables(factor);
+  Eigen::Index at = 0;
+  for (std::size_t k = 0; k < on.size(); at += rows.sizes[k++]) {
+    if (!rows.J.middleCols(at, rows.sizes[k]).isZero(0.0)) continue;
+    const int v = on[k];
+    if (graph.fixed(v) || graph.factors_of(v).size() > 1) continue;
+    std::vector<const double*> x;
+    for (const std::int32_t other : on) x.push_back(graph.state(other).data());
+    const std::vector<double> before(graph.state(v).begin(), graph.state(v).end());
+    std::vector<double> placed = before;
+    const FactorType& type = graph.factor_type(factor);
+    const bool can = call_factor(
+        type, [&] { return graph.describe_factor(factor); },
+        [&] {
+          return type.propagate(static_cast<int>(k), x.data(), graph.measurement(factor).data(),
+                                placed.data());
+        });
+    if (!can || !is_finite(placed)) continue;
+    graph.set_state(v, placed);
+    origins[static_cast<std::size_t>(v)] = placed;
+    try {
+      models[static_cast<std::size_t>(factor)] = {linearize(factor, at_origins)};
+      return;
+    } catch (const Error&) {  // it is not finite there
+      graph.set_state(v, before);
+      origins[static_cast<std::size_t>(v)] = before;
+    }
+  }
+}
+
 /// Follows what an update changes, linearising what is new as it comes.
 class LinearizedEstimator::Target final : public UpdateTarget {
  public:
@@ -234,7 +269,11 @@ void LinearizedEstimator::carry_out(const GraphUpdate& update, const UpdateOptio
   const auto begin = Clock::now();
   const bool batch = is_batch_step(update, options);
   Target target(state_, !batch_);
+  const int factors = state_.graph.factor_count();
   const AppliedUpdate applied = cairn::carry_out(update, state_.losses, target);
+  for (int f = only_adds(update) ? factors : state_.graph.factor_count();
+       f < state_.graph.factor_count(); ++f)
+    state_.place_unseen(f, batch_.has_value());
   report.first_factor = applied.first_factor;
   report.priors = applied.priors;
   report.seconds.linearize = seconds_since(begin);
@@ -385,12 +424,12 @@ void LinearizedEstimator::solve(UpdateReport& report) {
     report.iterations = 1;
     report.affected_variables = state_.graph.variable_count();
   } else {
-    const FreeDirections& free = watch_.free();
-    const int variable = free.empty() ? *state_.graph.find(form_->undetermined())
-                                      : free.directions.front().moves.front().variable;
-    note(fmt::format("{} is not determined: the estimate stays until it is",
-                     state_.graph.describe_variable(variable)),
-         report);
+    if (watch_.free().empty()) {
+      const int variable = *state_.graph.find(form_->undetermined());
+      note(fmt::format("{} is not determined: the estimate stays until it is",
+                       state_.graph.describe_variable(variable)),
+           report);
+    }
     report_free(report);
   }
   report.seconds.factorize = seconds_since(begin);

@@ -94,6 +94,7 @@ class LinearizedEstimator final : public Estimator {
     State clone() const;
     /// Rows J d + c at the estimate or, with `at_origins`, at the points of linearisation.
     Rows linearize(int factor, bool at_origins) const;
+    void place_unseen(int factor, bool at_origins);
   };
 
   class Before;

@@ -280,7 +280,7 @@ TEST_P(Filters, WaitForWhatDeterminesAVariable) {
   update.factors = {position(0, 1.0, 2.0), position(1, 3.0, 0.0, {1.0, 0.0, 0.0})};
   UpdateReport report = estimator_->update(update);
   EXPECT_FALSE(report.ok);
-  EXPECT_THAT(report.notes, Contains(HasSubstr("VERTEX_XY 1 is not determined")));
+  EXPECT_THAT(report.notes, Contains(HasSubstr("VERTEX_XY 1 is free")));
   update = {};
   update.factors = {difference(0, 1, 2.0, 2.0)};
   report = estimator_->update(update);
