@@ -126,18 +126,12 @@ std::string residual_not_finite(const Graph& graph) {
 
 std::vector<std::string> outside_of_domains(const Graph& graph) {
   std::vector<std::string> sentences;
-  for (std::size_t p = 0; p < graph.factor_pools().size(); ++p) {
-    const FactorPool& pool = graph.factor_pools()[p];
+  for (const FactorPool& pool : graph.factor_pools()) {
     const auto* domain = dynamic_cast<const Domain*>(pool.type.get());
     if (!domain) continue;
-    std::vector<const double*> states;
-    std::vector<double> reaches(pool.size());
-    domain->reaches(graph.view(static_cast<int>(p), graph.values(), states), reaches.data());
     std::map<std::string, std::pair<int, int>> reasons;  // the first factor and the number of each
-    for (std::size_t entry = 0; entry < reaches.size(); ++entry) {
-      if (reaches[entry] > 0.0) continue;
-      const int position = pool.sequence[entry];
-      states.clear();
+    for (const std::int32_t position : pool.sequence) {
+      std::vector<const double*> states;
       for (const std::int32_t v : graph.factor_variables(position))
         states.push_back(graph.state(v).data());
       const std::string reason = domain->outside(states.data());

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <iterator>
+#include <map>
 #include <optional>
 #include <span>
 #include <utility>
@@ -15,6 +15,7 @@
 #include <Eigen/Core>
 
 #include "cairn/types/domain.hpp"
+#include "cairn/types/factor_call.hpp"
 #include "dense/cholesky.hpp"
 
 namespace cairn {
@@ -24,6 +25,8 @@ namespace {
 constexpr double kLarge = 2500.0;
 /// So many times farther than others, a point is as good as at infinity.
 constexpr double kFar = 30.0;
+/// So many factors tell how far variables are from each other.
+constexpr std::size_t kSampled = 1000;
 constexpr int kIterations = 30;
 /// Places for a variable, as shares of the distance at which others are.
 constexpr double kReaches[] = {1.0, 0.3, 3.0};
@@ -43,14 +46,6 @@ std::vector<const double*> states_in(const Graph& graph, const Values& values, i
   for (const std::int32_t v : graph.factor_variables(factor))
     all.push_back(state_in(graph, values, v).data());
   return all;
-}
-
-double squared_norm(const Graph& graph, int factor, const std::vector<const double*>& x) {
-  const FactorType& type = graph.factor_type(factor);
-  Eigen::VectorXd r(type.residual_size());
-  type.evaluate(x.data(), graph.measurement(factor).data(), graph.sqrt_information(factor).data(),
-                r.data(), nullptr);
-  return r.squaredNorm();
 }
 
 /// One variable, all others constant.
@@ -140,36 +135,37 @@ double Alone::descend(State& x) const {
   return reached;
 }
 
-/// The factors of one type with a domain: how far their variables are from each other inside of it,
-/// and which are outside, or much farther, and have a large residual.
-struct Survey {
-  const Domain* domain = nullptr;
-  std::vector<int> astray;  ///< positions in the graph
-  double reach = 1.0;       ///< median
+/// The factors of one type with a domain.
+struct Pool {
+  const Domain& domain;
+  std::vector<int> large;  ///< positions in the graph
+  double reach = 1.0;      ///< how far their variables are from each other, the median
 };
 
-Survey survey(const Graph& graph, int of_pool, const Values& values) {
-  const FactorPool& pool = graph.factor_pools()[static_cast<std::size_t>(of_pool)];
-  Survey result;
-  result.domain = dynamic_cast<const Domain*>(pool.type.get());
-  if (!result.domain) return result;
+/// Nothing where no residual is large.
+std::optional<Pool> survey(const Graph& graph, int number, const Values& values) {
+  const FactorPool& pool = graph.factor_pools()[static_cast<std::size_t>(number)];
+  const auto* domain = dynamic_cast<const Domain*>(pool.type.get());
+  if (!domain || pool.size() == 0) return std::nullopt;
   std::vector<const double*> states;
-  std::vector<double> reaches(pool.size());
-  result.domain->reaches(graph.view(of_pool, values, states), reaches.data());
-  std::vector<double> inside;
-  inside.reserve(reaches.size());
-  std::ranges::copy_if(reaches, std::back_inserter(inside), [](double r) { return r > 0.0; });
-  if (!inside.empty()) {
-    const auto middle = inside.begin() + std::ssize(inside) / 2;
-    std::ranges::nth_element(inside, middle);
-    result.reach = *middle;
+  std::vector<double> norms(pool.size());
+  const FactorView view = graph.view(number, values, states);
+  call_factor(*pool.type, [&] { pool.type->squared_norms(view, 0, norms.size(), norms.data()); });
+  Pool found{*domain, {}};
+  for (std::size_t entry = 0; entry < norms.size(); ++entry)
+    if (!(norms[entry] <= kLarge)) found.large.push_back(pool.sequence[entry]);
+  if (found.large.empty()) return std::nullopt;
+  std::vector<double> reaches;
+  for (std::size_t entry = 0; entry < norms.size(); entry += 1 + norms.size() / kSampled) {
+    const double reach = domain->reach(states_in(graph, values, pool.sequence[entry]).data());
+    if (reach > 0.0) reaches.push_back(reach);
   }
-  for (std::size_t entry = 0; entry < reaches.size(); ++entry) {
-    const int f = pool.sequence[entry];
-    if (reaches[entry] > 0.0 && reaches[entry] <= kFar * result.reach) continue;
-    if (squared_norm(graph, f, states_in(graph, values, f)) > kLarge) result.astray.push_back(f);
+  if (!reaches.empty()) {
+    const auto middle = reaches.begin() + std::ssize(reaches) / 2;
+    std::ranges::nth_element(reaches, middle);
+    found.reach = *middle;
   }
-  return result;
+  return found;
 }
 
 /// The best state inside all domains that is found from the places that the factors give; nothing
@@ -198,38 +194,55 @@ std::optional<State> better_inside(const Graph& graph, const Alone& alone, int v
   return best;
 }
 
-std::string in_words(const Graph& graph, const Domain& domain, const Values& values, int factor) {
-  const auto x = states_in(graph, values, factor);
-  const std::string outside = domain.outside(x.data());
-  return fmt::format(
-      "{}: {}", graph.describe_factor(factor),
-      outside.empty() ? "its variables are far from each other beside the others" : outside);
+/// Whether a factor with a large residual says nothing, or nearly nothing, of how to lower it.
+bool is_astray(const Graph& graph, const Pool& pool, const Values& values, int factor) {
+  const double reach = pool.domain.reach(states_in(graph, values, factor).data());
+  return !(reach > 0.0 && reach <= kFar * pool.reach);
+}
+
+/// The variables that most of their residuals, or one without a meaning, show to be misplaced, each
+/// with one of these factors.
+std::map<std::int32_t, int> misplaced(const Graph& graph, const Pool& pool,
+                                      const std::vector<std::vector<int>>& factors,
+                                      const Values& values) {
+  std::map<std::int32_t, std::size_t> large;
+  std::map<std::int32_t, int> found;
+  for (const int f : pool.large) {
+    const bool astray = is_astray(graph, pool, values, f);
+    for (const std::int32_t v : graph.factor_variables(f)) {
+      if (2 * ++large[v] > factors[static_cast<std::size_t>(v)].size() || astray)
+        found.try_emplace(v, f);
+    }
+  }
+  return found;
+}
+
+std::string in_words(const Graph& graph, const Pool& pool, const Values& values, int factor) {
+  const std::string outside = pool.domain.outside(states_in(graph, values, factor).data());
+  return fmt::format("{}: {}", graph.describe_factor(factor),
+                     outside.empty() ? "its residual is large" : outside);
 }
 
 }  // namespace
 
 std::string enter_domains(const Graph& graph, const std::vector<bool>& held, Values& values) {
-  std::vector<Survey> surveys;
-  for (int pool = 0; pool < static_cast<int>(graph.factor_pools().size()); ++pool)
-    surveys.push_back(survey(graph, pool, values));
-  if (std::ranges::all_of(surveys, [](const Survey& s) { return s.astray.empty(); })) return {};
+  std::vector<Pool> pools;
+  for (int p = 0; p < static_cast<int>(graph.factor_pools().size()); ++p)
+    if (std::optional<Pool> found = survey(graph, p, values)) pools.push_back(std::move(*found));
+  if (pools.empty()) return {};
 
   const std::vector<std::vector<int>> factors = factors_by_variable(graph);
-  std::vector<bool> tried(held);
   std::string first;
   int moved = 0;
-  for (const Survey& of : surveys) {
-    for (const int f : of.astray) {
-      for (const std::int32_t v : graph.factor_variables(f)) {
-        const auto k = static_cast<std::size_t>(v);
-        if (tried[k]) continue;
-        tried[k] = true;
-        const Alone alone(graph, values, v, factors[k]);
-        const std::optional<State> better = better_inside(graph, alone, v, of.reach);
-        if (!better) continue;
-        if (moved++ == 0) first = in_words(graph, *of.domain, values, f);
-        std::ranges::copy(*better, state_in(graph, values, v).begin());
-      }
+  for (const Pool& pool : pools) {
+    for (const auto& [v, factor] : misplaced(graph, pool, factors, values)) {
+      const auto k = static_cast<std::size_t>(v);
+      if (held[k]) continue;
+      const Alone alone(graph, values, v, factors[k]);
+      const std::optional<State> better = better_inside(graph, alone, v, pool.reach);
+      if (!better) continue;
+      if (moved++ == 0) first = in_words(graph, pool, values, factor);
+      std::ranges::copy(*better, state_in(graph, values, v).begin());
     }
   }
   if (moved == 0) return {};

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <array>
-#include <cstddef>
 #include <memory>
 #include <string>
 #include <tuple>
@@ -21,17 +19,16 @@ class CAIRN_API Domain {
   /// Why the residual has no meaning at the states x, one of each variable in order, such as "the
   /// point is behind the camera"; empty where it has.
   virtual std::string outside(const double* const* x) const = 0;
-  /// For each factor of a pool how far its variables are from each other, such as a point from the
-  /// camera; negative where the residual has no meaning.
-  virtual void reaches(const FactorView& pool, double* out) const = 0;
+  /// How far the variables are from each other, such as a point from the camera; negative where the
+  /// residual has no meaning.
+  virtual double reach(const double* const* x) const = 0;
   /// The state of variable `target`, given the others, that is so far from them and has nearly no
   /// residual, inside the domain. False if the measurement does not determine it.
   virtual bool place(int target, const double* const* x, const double* measurement, double reach,
                      double* out) const = 0;
 };
 
-/// `define_factor` for a struct that also has, all static, `outside` and `place` as `Domain` has
-/// them, and `double reach(const double* const* x)` for one factor.
+/// `define_factor` for a struct that also has, all static, what a `Domain` has.
 template <FactorTraits F>
 std::shared_ptr<const FactorType> define_factor_with_domain() {
   class Type final : public FactorType,
@@ -41,16 +38,7 @@ std::shared_ptr<const FactorType> define_factor_with_domain() {
                                                NeverThrows, detail::MayThrow> {
    public:
     std::string outside(const double* const* x) const override { return F::outside(x); }
-    void reaches(const FactorView& pool, double* out) const override {
-      constexpr std::size_t kArity = std::tuple_size_v<typename F::Variables>;
-      std::array<const double*, kArity> x{};
-      for (std::size_t f = 0; f < pool.size; ++f) {
-        for (std::size_t k = 0; k < kArity; ++k)
-          x[k] = pool.states[k] + std::ptrdiff_t{pool.slots[f * kArity + k]} *
-                                      factor_->ambient_size(static_cast<int>(k));
-        out[f] = F::reach(x.data());
-      }
-    }
+    double reach(const double* const* x) const override { return F::reach(x); }
     bool place(int target, const double* const* x, const double* measurement, double reach,
                double* out) const override {
       return F::place(target, x, measurement, reach, out);

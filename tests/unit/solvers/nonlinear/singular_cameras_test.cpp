@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <limits>
 #include <string>
 #include <vector>
@@ -25,10 +26,16 @@ namespace {
 using testing::Contains;
 using testing::HasSubstr;
 
-constexpr int kPoints = 12, kProblems = 60;
+constexpr int kPoints = 12;
 const std::vector<std::string> kOptimizers{"levenberg_marquardt", "gauss_newton", "dogleg",
                                            "ceres:linear_solver_type=dense_schur",
                                            "ceres_line_search"};
+/// CAIRN_CAMERA_PROBLEMS, or 60.
+std::uint64_t problems() {
+  const char* count = std::getenv("CAIRN_CAMERA_PROBLEMS");
+  return count ? std::strtoull(count, nullptr, 10) : 60;
+}
+
 enum class Place { in_plane, nearly, centre, behind, far_behind, beyond };
 constexpr int kPlaces = 6;
 
@@ -150,8 +157,8 @@ TEST_F(SingularCameras, HideNoWorseMinimum) {
   for (const std::string& name : kOptimizers) {
     if (!registry.has("optimizer", parse_component(name).name)) continue;
     const auto optimizer = registry.make<Optimizer>(with_some_linear_solver(name));
-    int arrived = 0;
-    for (std::uint64_t seed = 0; seed < kProblems; ++seed) {
+    std::uint64_t arrived = 0;
+    for (std::uint64_t seed = 0; seed < problems(); ++seed) {
       const Graph given = problem(seed, true);
       const double best = least(given, problem(seed, false), registry);
       Graph graph = given.clone();
@@ -164,7 +171,7 @@ TEST_F(SingularCameras, HideNoWorseMinimum) {
     }
     // Gauss-Newton needs a gauge that is not free; line search is slow.
     if (name != "gauss_newton" && name != "ceres_line_search") {
-      EXPECT_GE(arrived, 9 * kProblems / 10) << name;
+      EXPECT_GE(arrived, 98 * problems() / 100) << name;
     }
   }
 }
