@@ -13,6 +13,7 @@
 
 #include "cairn/types/factor_call.hpp"
 #include "dense/eigenvalues.hpp"
+#include "free_alone.hpp"
 
 namespace cairn {
 
@@ -736,7 +737,8 @@ FreeDirections find_free_directions(const LinearRows& rows, const FreeSearch& se
 namespace {
 
 /// Cameras with unknown intrinsics and the points that they see: pixels, metres and coefficients of
-/// distortion span so many orders of magnitude that what is free cannot be told from what is weak.
+/// distortion span so many orders of magnitude that what is free cannot be told from what is weak,
+/// but of each variable alone.
 bool has_cameras(const Graph& graph) {
   return std::ranges::any_of(graph.variable_pools(), [](const VariablePool& pool) {
     const Placement* placement = pool.type->placement();
@@ -746,16 +748,10 @@ bool has_cameras(const Graph& graph) {
   });
 }
 
-FreeDirections given_up() {
-  FreeDirections nothing;
-  nothing.complete = false;
-  return nothing;
-}
-
 }  // namespace
 
 FreeDirections find_free_directions(const Graph& graph, const Gauge& gauge, const Values& values) {
-  if (has_cameras(graph)) return given_up();
+  if (has_cameras(graph)) return free_alone(graph, gauge, values, GraphRows(graph, values));
   if (all_are_whole_relative_poses(graph, gauge)) return {};
   const std::vector<bool> determined = determined_by_whole_relative_poses(graph, gauge.held);
   const std::vector<std::int32_t> factors = factors_on_others(graph, determined);

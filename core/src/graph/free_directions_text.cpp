@@ -91,9 +91,10 @@ std::string id_of(const Graph& graph, int variable) {
   return name.substr(name.rfind(' ') + 1);
 }
 
-/// "pose 7", or with its tag what is none.
+/// "pose 7", or with its tag what is none, or more than that.
 std::string name_of(const Graph& graph, int variable) {
-  if (is_pose(graph.type(variable))) return "pose " + id_of(graph, variable);
+  const VariableType& type = graph.type(variable);
+  if (is_pose(type) && type.lie_group()) return "pose " + id_of(graph, variable);
   return graph.describe_variable(variable);
 }
 

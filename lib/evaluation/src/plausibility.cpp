@@ -126,16 +126,21 @@ std::string residual_not_finite(const Graph& graph) {
 
 std::vector<std::string> outside_of_domains(const Graph& graph) {
   std::vector<std::string> sentences;
-  for (const FactorPool& pool : graph.factor_pools()) {
+  for (std::size_t p = 0; p < graph.factor_pools().size(); ++p) {
+    const FactorPool& pool = graph.factor_pools()[p];
     const auto* domain = dynamic_cast<const Domain*>(pool.type.get());
     if (!domain) continue;
+    std::vector<const double*> pools;
+    const FactorView view = graph.view(static_cast<int>(p), graph.values(), pools);
+    std::vector<const double*> states(pools.size());
     std::map<std::string, std::pair<int, int>> reasons;  // the first factor and the number of each
-    for (const std::int32_t position : pool.sequence) {
-      std::vector<const double*> states;
-      for (const std::int32_t v : graph.factor_variables(position))
-        states.push_back(graph.state(v).data());
+    for (std::size_t entry = 0; entry < view.size; ++entry) {
+      for (std::size_t k = 0; k < states.size(); ++k)
+        states[k] = pools[k] + std::ptrdiff_t{view.slots[entry * states.size() + k]} *
+                                   pool.type->ambient_size(static_cast<int>(k));
       const std::string reason = domain->outside(states.data());
-      if (!reason.empty()) ++reasons.try_emplace(reason, position, 0).first->second.second;
+      if (!reason.empty())
+        ++reasons.try_emplace(reason, pool.sequence[entry], 0).first->second.second;
     }
     for (const auto& [reason, found] : reasons) {
       const auto [first, count] = found;

@@ -200,18 +200,36 @@ bool is_astray(const Graph& graph, const Pool& pool, const Values& values, int f
   return !(reach > 0.0 && reach <= kFar * pool.reach);
 }
 
+using FactorsOf = std::map<std::int32_t, std::vector<int>>;
+
+/// The factors of each variable that has one with a large residual.
+FactorsOf factors_of_suspects(const Graph& graph, const std::vector<Pool>& pools) {
+  std::vector<bool> suspect(static_cast<std::size_t>(graph.variable_count()), false);
+  for (const Pool& pool : pools)
+    for (const int f : pool.large)
+      for (const std::int32_t v : graph.factor_variables(f))
+        suspect[static_cast<std::size_t>(v)] = true;
+  FactorsOf factors;
+  for (const FactorPool& pool : graph.factor_pools()) {
+    const auto arity = static_cast<std::size_t>(pool.type->arity());
+    for (std::size_t k = 0; k < pool.variables.size(); ++k) {
+      const std::int32_t v = pool.variables[k];
+      if (suspect[static_cast<std::size_t>(v)]) factors[v].push_back(pool.sequence[k / arity]);
+    }
+  }
+  return factors;
+}
+
 /// The variables that most of their residuals, or one without a meaning, show to be misplaced, each
 /// with one of these factors.
 std::map<std::int32_t, int> misplaced(const Graph& graph, const Pool& pool,
-                                      const std::vector<std::vector<int>>& factors,
-                                      const Values& values) {
+                                      const FactorsOf& factors, const Values& values) {
   std::map<std::int32_t, std::size_t> large;
   std::map<std::int32_t, int> found;
   for (const int f : pool.large) {
     const bool astray = is_astray(graph, pool, values, f);
     for (const std::int32_t v : graph.factor_variables(f)) {
-      if (2 * ++large[v] > factors[static_cast<std::size_t>(v)].size() || astray)
-        found.try_emplace(v, f);
+      if (2 * ++large[v] > factors.at(v).size() || astray) found.try_emplace(v, f);
     }
   }
   return found;
@@ -231,14 +249,13 @@ std::string enter_domains(const Graph& graph, const std::vector<bool>& held, Val
     if (std::optional<Pool> found = survey(graph, p, values)) pools.push_back(std::move(*found));
   if (pools.empty()) return {};
 
-  const std::vector<std::vector<int>> factors = factors_by_variable(graph);
+  const FactorsOf factors = factors_of_suspects(graph, pools);
   std::string first;
   int moved = 0;
   for (const Pool& pool : pools) {
     for (const auto& [v, factor] : misplaced(graph, pool, factors, values)) {
-      const auto k = static_cast<std::size_t>(v);
-      if (held[k]) continue;
-      const Alone alone(graph, values, v, factors[k]);
+      if (held[static_cast<std::size_t>(v)]) continue;
+      const Alone alone(graph, values, v, factors.at(v));
       const std::optional<State> better = better_inside(graph, alone, v, pool.reach);
       if (!better) continue;
       if (moved++ == 0) first = in_words(graph, pool, values, factor);
