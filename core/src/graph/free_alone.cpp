@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "free_alone.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
+#include <map>
 #include <span>
 #include <utility>
 
@@ -44,13 +42,13 @@ bool is_point(const VariableType& type) {
 }
 
 /// The points that are seen from two places, by factors that tell a direction at least.
-std::vector<bool> seen_from_two_places(const Graph& graph, const Values& values) {
+std::vector<char> seen_from_two_places(const Graph& graph, const Values& values) {
   std::vector<std::vector<Point>> at;
   for (std::size_t p = 0; p < graph.variable_pools().size(); ++p)
     at.push_back(positions(graph.variable_pools()[p], values.pools[p]));
   const auto count = static_cast<std::size_t>(graph.variable_count());
   std::vector<Point> rays(count, Point::Zero());
-  std::vector<bool> seen(count, false);
+  std::vector<char> seen(count, false);
   for (const FactorPool& pool : graph.factor_pools()) {
     if (pool.type->arity() != 2) continue;
     for (const std::size_t side : {0U, 1U}) {
@@ -95,78 +93,95 @@ MatrixXd null_space(MatrixXd J) {
   return scale.asDiagonal() * (qr.colsPermutation() * basis);
 }
 
+/// Rows on one variable, each factor's scaled to one.
+struct Own {
+  MatrixXd J;
+  Eigen::Index used = 0;
+  Eigen::Index look_at = 0;  ///< as soon as there are so many: mostly a few are enough
+};
+
+/// Goes through the factors of variables that are not settled yet.
 class Alone {
  public:
-  Alone(const Graph& graph, const LinearRows& rows) : graph_(graph), rows_(rows) {}
+  Alone(const Graph& graph, const LinearRows& rows, std::vector<char> settled)
+      : graph_(graph), rows_(rows), settled_(std::move(settled)) {}
 
-  /// What these factors leave free of a variable. Nothing if a Jacobian is not finite.
-  std::optional<MatrixXd> free(int variable, std::span<const std::int32_t> factors) {
-    const Eigen::Index n = graph_.type(variable).tangent_size();
-    Eigen::Index most = 0, looked_at = n;
-    for (const std::int32_t f : factors) most += rows_.rows(f);
-    J_.resize(most, n);
-    used_ = 0;
-    for (const std::int32_t f : factors) {
-      if (!append(f, variable)) return std::nullopt;
-      if (used_ < looked_at) continue;
-      if (null_space(J_.topRows(used_)).cols() == 0) return MatrixXd(n, 0);
-      looked_at *= 2;  // mostly a few are enough
+  /// False if a Jacobian is not finite.
+  bool run() {
+    for (const FactorPool& pool : graph_.factor_pools()) {
+      const auto arity = static_cast<std::size_t>(pool.type->arity());
+      for (std::size_t k = 0; k < pool.variables.size(); ++k) {
+        const std::int32_t v = pool.variables[k];
+        if (!settled_[static_cast<std::size_t>(v)] && !look_at(v, pool.sequence[k / arity]))
+          return false;
+      }
     }
-    return null_space(J_.topRows(used_));
+    return true;
+  }
+
+  std::vector<FreeDirection> directions() const {
+    std::vector<FreeDirection> all;
+    for (const auto& [v, own] : own_) {
+      const MatrixXd basis = null_space(own.J.topRows(own.used));
+      for (Eigen::Index j = 0; j < basis.cols(); ++j) {
+        const auto delta = basis.col(j);
+        all.push_back({{{v, {delta.begin(), delta.end()}}}, v});
+      }
+    }
+    return all;
   }
 
  private:
-  bool append(int factor, int variable) {
+  bool look_at(std::int32_t v, int factor) {
+    Own& own = own_[v];
+    const Eigen::Index n = graph_.type(v).tangent_size();
+    if (own.look_at == 0) own = {MatrixXd(2 * n, n), 0, n};
+    if (!append(v, factor, own)) return false;
+    if (own.used < own.look_at) return true;
+    own.look_at *= 2;
+    if (null_space(own.J.topRows(own.used)).cols() > 0) return true;
+    settled_[static_cast<std::size_t>(v)] = true;
+    own_.erase(v);
+    return true;
+  }
+
+  bool append(std::int32_t variable, int factor, Own& own) {
     const int m = rows_.rows(factor);
     Eigen::Index columns = 0, first = 0;
     for (const std::int32_t v : rows_.variables(factor)) {
       if (v == variable) first = columns;
       columns += graph_.type(v).tangent_size();
     }
-    of_factor_.resize(m, columns);
-    rows_.jacobian(factor, {of_factor_.data(), static_cast<std::size_t>(of_factor_.size())});
-    if (!of_factor_.allFinite()) return false;
-    const auto own = of_factor_.middleCols(first, J_.cols());
-    const double largest = own.cwiseAbs().maxCoeff();
+    J_.resize(m, columns);
+    rows_.jacobian(factor, {J_.data(), static_cast<std::size_t>(J_.size())});
+    if (!J_.allFinite()) return false;
+    const auto block = J_.middleCols(first, own.J.cols());
+    const double largest = block.cwiseAbs().maxCoeff();
     if (!(largest > 0.0)) return true;
-    J_.middleRows(used_, m) = own / largest;
-    used_ += m;
+    if (own.used + m > own.J.rows()) own.J.conservativeResize(2 * (own.used + m), Eigen::NoChange);
+    own.J.middleRows(own.used, m) = block / largest;
+    own.used += m;
     return true;
   }
 
   const Graph& graph_;
   const LinearRows& rows_;
-  MatrixXd J_, of_factor_;
-  Eigen::Index used_ = 0;  // rows of J
+  std::vector<char> settled_;        // by variable
+  std::map<std::int32_t, Own> own_;  // of those that are not
+  MatrixXd J_;
 };
 
 }  // namespace
 
 FreeDirections free_alone(const Graph& graph, const Gauge& gauge, const Values& values,
                           const LinearRows& rows) {
-  const std::vector<bool> seen = seen_from_two_places(graph, values);
-  std::vector<std::vector<std::int32_t>> factors(seen.size());
-  for (const FactorPool& pool : graph.factor_pools()) {
-    const auto arity = static_cast<std::size_t>(pool.type->arity());
-    for (std::size_t k = 0; k < pool.variables.size(); ++k) {
-      const auto v = static_cast<std::size_t>(pool.variables[k]);
-      if (!seen[v] && !gauge.held[v]) factors[v].push_back(pool.sequence[k / arity]);
-    }
-  }
+  std::vector<char> settled = seen_from_two_places(graph, values);
+  for (std::size_t v = 0; v < settled.size(); ++v) settled[v] = settled[v] || gauge.held[v];
+  Alone alone(graph, rows, std::move(settled));
   FreeDirections found;
-  Alone alone(graph, rows);
-  for (std::size_t v = 0; v < factors.size(); ++v) {
-    if (factors[v].empty()) continue;
-    const std::optional<MatrixXd> basis = alone.free(static_cast<int>(v), factors[v]);
-    found.finite = found.finite && basis;
-    if (!found.finite) break;
-    for (Eigen::Index j = 0; j < basis->cols(); ++j) {
-      const auto delta = basis->col(j);
-      found.directions.push_back(
-          {{{static_cast<int>(v), {delta.begin(), delta.end()}}}, static_cast<int>(v)});
-    }
-  }
   found.complete = false;
+  found.finite = alone.run();
+  if (found.finite) found.directions = alone.directions();
   found.everywhere = found.empty();  // as they move, others hardly come to be
   return found;
 }
