@@ -2,19 +2,20 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string_view>
 #include <utility>
 
 #include <fmt/core.h>
+#include <boost/math/distributions/chi_squared.hpp>
 
 #include "cairn/evaluation/plausibility.hpp"
 #include "cairn/evaluation/second_look.hpp"
 #include "cairn/evaluation/watched_guess.hpp"
 #include "cairn/graph/gauge.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/update/rejected_factors.hpp"
 #include "guesses.hpp"
 #include "other_minima.hpp"
 #include "placing.hpp"
@@ -49,8 +50,8 @@ class Until final : public Observer {
 /// the loss is tightened from there.
 ///
 /// How the optimisation went that follows tells more (`look_again`): where poses disagree with
-/// measurements by a large angle, or by some angle and chi2 fell by far, or where a loss is
-/// bounded, other minima are looked for.
+/// measurements by a large angle, or by some angle and chi2 fell by far, where chi2 is larger than
+/// chance allows, or where a loss is bounded or rejects measurements, other minima are looked for.
 class Automatic final : public InitialGuess, public WatchedGuess, public SecondLook {
  public:
   Automatic(int iterations, Candidates candidates)
@@ -141,22 +142,11 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
 
   /// By a Cauchy loss in the place of each bounded one, whose scale is then tightened.
   std::vector<std::string> choose_by_a_loss_that_grows(Graph& graph, const KeptLosses& losses) {
-    const auto set_losses = [&](const auto& make) {
-      std::map<const Loss*, std::shared_ptr<const Loss>> made;
-      for (int f = 0; f < graph.factor_count(); ++f) {
-        const std::shared_ptr<const Loss>& own = losses.losses()[static_cast<std::size_t>(f)];
-        if (!own || !is_bounded(*own)) continue;
-        std::shared_ptr<const Loss>& instead = made[own.get()];
-        if (!instead) instead = make(own);
-        graph.set_loss(f, instead);
-      }
-    };
-    const auto cauchy = make_cauchy(kCauchySquare);
-    set_losses([&](const auto&) { return cauchy; });
+    set_instead_of_bounded(graph, losses, [](const auto&) { return make_cauchy(); });
     std::vector<std::string> notes = choose(graph);
     optimise(kToAMinimum, graph);
     for (const double k : {4.0, 2.0}) {
-      set_losses([&](const auto& own) { return make_wider(own, k); });
+      set_instead_of_bounded(graph, losses, [k](const auto& own) { return make_wider(own, k); });
       optimise(kOnTheWay, graph);
     }
     if (!notes.empty()) notes.front() += ", by a cauchy loss that was tightened to the bounded one";
@@ -234,11 +224,29 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
     // Where measurements are wrong, minima are many, and none is the right one: that is said.
     const std::int64_t dof = degrees_of_freedom(graph, resolve_gauge(graph));
     if (!is_plausible(summary.final_chi2, dof)) return {};
+    if (rejects(graph)) return "since losses reject measurements";
+    if (!graph.has_losses() && is_beyond_chance(summary.final_chi2, dof)) {
+      return fmt::format("since chi2 is {:.3g} times the {} degrees of freedom",
+                         summary.final_chi2 / static_cast<double>(dof), dof);
+    }
     const double angle = largest_turn(graph);
     if (fall > kLargeFall && angle > kSmallAngle)
       return fmt::format("since chi2 fell {:.3g} times from the start", fall);
     if (!(angle > kLargeAngle)) return {};
     return fmt::format("since poses disagree with a measurement by {:.2g} rad", angle);
+  }
+
+  static bool rejects(const Graph& graph) {
+    const RejectedFactors rejected = rejected_factors(graph);
+    return rejected.rejected_loops + rejected.rejected_others > 0;
+  }
+
+  /// Whether right measurements with the right information lead to that chi2 less than once in
+  /// 10,000 times: it is χ² at the minimum.
+  static bool is_beyond_chance(double chi2, std::int64_t dof) {
+    if (dof <= 0) return false;
+    const boost::math::chi_squared distribution(static_cast<double>(dof));
+    return chi2 > boost::math::quantile(boost::math::complement(distribution, kChance));
   }
 
   void small_steps(Graph& graph) {
@@ -257,11 +265,17 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
   }
 
   static std::string doubt(const OtherMinima& found) {
-    if (!found.until_the_end) return {};
+    if (found.until_the_end) {
+      return fmt::format(
+          "{} of {} starts ended in other minima, and lower ones were found until the end: there "
+          "may be a lower one than chi2 {:.6g}",
+          found.elsewhere, found.starts, found.chi2);
+    }
+    if (!found.many_nearly_as_low()) return {};
     return fmt::format(
-        "{} of {} starts ended in other minima, and lower ones were found until the end: there may "
-        "be a lower one than chi2 {:.6g}",
-        found.elsewhere, found.starts, found.chi2);
+        "chi2 has many minima: {} of {} starts ended in this one, and {} others are within 5 % of "
+        "it: there may be a lower one than chi2 {:.6g}",
+        found.in_the_lowest, found.starts, found.nearly_as_low, found.chi2);
   }
 
   /// Whether to go on; once it is not, it never is.
@@ -272,12 +286,12 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
   static constexpr int kFewIterations = 5;
   static constexpr Stop kToAMinimum{.max_iterations = 100, .tolerance = 1e-6};
   static constexpr Stop kOnTheWay{.max_iterations = 30, .tolerance = 1e-4};
-  static constexpr double kCauchySquare = 2.3849 * 2.3849;  // as the loss `cauchy` by default
   // Other minima differ by turns: where no residual turns far, chi2 is nearly convex. Where they
   // turn a little, a start near the minimum is another sign that all is well.
   static constexpr double kLargeFall = 2.5;
   static constexpr double kSmallAngle = 0.1, kLargeAngle = 0.9;  // [rad]
   static constexpr double kToNothing = 1e10;
+  static constexpr double kChance = 1e-4;
 
   Stop stop_;
   Candidates candidates_;

@@ -10,6 +10,7 @@
 #include <fmt/core.h>
 
 #include "cairn/geometry/pose.hpp"
+#include "cairn/graph/factor_selector.hpp"
 #include "cairn/graph/gauge.hpp"
 #include "cairn/runtime/error.hpp"
 #include "trial_losses.hpp"
@@ -19,8 +20,11 @@ namespace {
 
 constexpr double kLower = 1e-4;            // a smaller fraction of chi2 is no lower minimum
 constexpr double kElsewhere = 1e-3;        // nor is this another one
-constexpr double kIterations = 200'000.0;  // of one variable
-constexpr int kLeavingOut = 16;            // random starts
+constexpr double kIterations = 500'000.0;  // of one variable
+constexpr int kInVain = 32;                // random starts in vain end the search
+constexpr int kMostTries = 1000;           // random starts
+constexpr double kNearly = 0.05;           // of chi2: minima that are nearly as low
+constexpr double kRejected = 0.01;         // of its weight without a loss
 constexpr Stop kOnTheWay{.max_iterations = 30, .tolerance = 1e-4};
 constexpr Stop kToAMinimum{.max_iterations = 60, .tolerance = 1e-6};
 
@@ -39,6 +43,11 @@ double median(std::vector<double> norms) {
   std::ranges::nth_element(norms, middle);
   return *middle;
 }
+
+/// A part of a trajectory, from one fraction of its poses to another.
+struct Part {
+  double begin, end;
+};
 
 class Search {
  public:
@@ -62,9 +71,10 @@ class Search {
     try_robust("cauchy", make_cauchy, 1.0);
     try_robust("geman_mcclure", make_geman_mcclure, 4.0);
     for (const double turns : {1.0, -1.0}) try_turned(turns, 0);
-    if (found_.elsewhere > 0 || !found_.found_by.empty()) try_more(starts);
+    if (!rejected().empty() || found_.elsewhere > 0 || !found_.found_by.empty()) try_more(starts);
     graph_.set_values(std::move(best_));
     found_.until_the_end = !found_.found_by.empty() && found_.starts - last_ <= found_.starts / 4;
+    count_nearly_as_low();
     return found_;
   }
 
@@ -74,6 +84,7 @@ class Search {
       graph_.set_values(given_);
       start.compute(graph_);
       spent_ += start.iterations;
+      tighten();
     });
   }
 
@@ -87,7 +98,57 @@ class Search {
     for (const int axis : {1, 2}) {
       for (const double turns : {1.0, -1.0}) try_turned(turns, axis);
     }
-    for (int k = 0; k < kLeavingOut; ++k) try_without_some();
+    for (int k = 0; found_.starts - last_ < kInVain && k < kMostTries; ++k) try_at_random(k);
+  }
+
+  void try_at_random(int k) {
+    if (k % 2 == 0 && !rejected().empty()) return try_with_rejected();
+    if (k % 4 == 1) return try_without_some(5, [](int) { return true; });
+    if (k % 4 == 2 && turns_about(0)) return try_turned_in_part();
+    const std::vector<bool> loops = loop_closures(graph_);
+    try_without_some(2, [&](int f) { return loops[static_cast<std::size_t>(f)]; });
+  }
+
+  /// The factors that losses have all but taken from the best minimum so far.
+  std::vector<int> rejected() {
+    std::vector<int> result;
+    if (!graph_.has_losses()) return result;
+    graph_.set_values(best_);
+    const std::vector<double> norms = squared_norms(graph_);
+    for (int f = 0; f < graph_.factor_count(); ++f) {
+      double weight = 1.0;
+      if (const Loss* loss = graph_.loss(f))
+        loss->evaluate({&norms[static_cast<std::size_t>(f)], 1}, {}, {&weight, 1});
+      if (weight < kRejected) result.push_back(f);
+    }
+    return result;
+  }
+
+  /// Tightens bounded losses: all measurements count at first, what contradicts the others less and
+  /// less.
+  void tighten() {
+    if (!has_bounded_losses(graph_)) return;
+    set_instead_of_bounded(graph_, losses_, [](const auto&) { return make_cauchy(); });
+    optimise(kOnTheWay);
+    for (const double k : {4.0, 2.0}) {
+      set_instead_of_bounded(graph_, losses_, [k](const auto& own) { return make_wider(own, k); });
+      optimise(kOnTheWay);
+    }
+  }
+
+  /// What was rejected counts fully, a half of it, a third, or a single factor: others give way.
+  void try_with_rejected() {
+    attempt("an estimate that takes back rejected factors", [&] {
+      const std::vector<int> all = rejected();
+      const std::uint64_t part = 1 + random_() % 3;
+      for (const int f : all) {
+        if (part > 1 && random_() % part == 0) graph_.set_loss(f, fully_);
+      }
+      if (part == 1) graph_.set_loss(all[random_() % all.size()], fully_);
+      optimise(kOnTheWay);
+      losses_.put_back();
+      tighten();
+    });
   }
 
   template <class Make>
@@ -101,11 +162,20 @@ class Search {
   }
 
   /// Further turns about an axis of the poses, the last of their tangent space first, spread over
-  /// all poses in the order of their ids.
-  void try_turned(double turns, int axis) {
+  /// a part of the poses in the order of their ids.
+  void try_turned(double turns, int axis, Part part = {0.0, 1.0}) {
     if (!turns_about(axis)) return;
-    attempt("a trajectory with further turns", [&] { turn(turns, axis); });
+    attempt("a trajectory with further turns", [&] { turn(turns, axis, part); });
   }
+
+  void try_turned_in_part() {
+    const int axis = turns_about(1) ? static_cast<int>(random_() % 3) : 0;
+    const double turns = random_() % 2 == 0 ? 1.0 : -1.0;
+    const double one = fraction(), other = fraction();
+    try_turned(turns, axis, {std::min(one, other), std::max(one, other)});
+  }
+
+  double fraction() { return static_cast<double>(random_() % 1024) / 1024.0; }
 
   bool turns_about(int axis) const {
     return std::ranges::any_of(graph_.variable_pools(), [&](const VariablePool& pool) {
@@ -114,22 +184,26 @@ class Search {
     });
   }
 
-  void turn(double turns, int axis) {
+  void turn(double turns, int axis, Part part) {
     for (const VariablePool& pool : graph_.variable_pools()) {
       if (!is_pose(*pool.type) || pool.variables.size() < 2) continue;
       std::vector<int> order(pool.variables.begin(), pool.variables.end());
       std::ranges::sort(order, {}, [&](int v) { return graph_.id(v); });
-      turn(*pool.type, order, turns, axis);
+      turn(*pool.type, order, turns, axis, part);
     }
   }
 
-  void turn(const VariableType& type, const std::vector<int>& order, double turns, int axis) {
+  void turn(const VariableType& type, const std::vector<int>& order, double turns, int axis,
+            Part part) {
     const LieGroup& group = *type.lie_group();
     const auto n = static_cast<std::size_t>(type.ambient_size());
     std::vector<double> tangent(static_cast<std::size_t>(type.tangent_size()));
     if (axis >= static_cast<int>(tangent.size())) return;
+    const auto first = static_cast<std::size_t>(part.begin * static_cast<double>(order.size()));
+    const auto last = static_cast<std::size_t>(part.end * static_cast<double>(order.size()));
+    if (last <= first) return;
     tangent[tangent.size() - 1 - static_cast<std::size_t>(axis)] =
-        2.0 * std::numbers::pi * turns / static_cast<double>(order.size());
+        2.0 * std::numbers::pi * turns / static_cast<double>(last - first);
     std::vector<double> step(n), inverse(n), motion(n), turned(n), next(n);
     group.exp(tangent.data(), step.data());
     std::vector<double> before(graph_.state(order[0]).begin(), graph_.state(order[0]).end());
@@ -138,7 +212,10 @@ class Search {
       const std::vector<double> old(graph_.state(order[k]).begin(), graph_.state(order[k]).end());
       group.inverse(before.data(), inverse.data());
       group.compose(inverse.data(), old.data(), motion.data());
-      group.compose(motion.data(), step.data(), turned.data());
+      if (k >= first && k < last)
+        group.compose(motion.data(), step.data(), turned.data());
+      else
+        turned = motion;
       group.compose(at.data(), turned.data(), next.data());
       before = old;
       at = gauge_.held[static_cast<std::size_t>(order[k])] ? old : next;
@@ -147,10 +224,12 @@ class Search {
     }
   }
 
-  void try_without_some() {
+  /// One in `of` of the factors that `select` names almost left out.
+  template <class Select>
+  void try_without_some(std::uint64_t of, const Select& select) {
     attempt("an estimate without a part of the factors", [&] {
       for (int f = 0; f < graph_.factor_count(); ++f) {
-        if (random_() % 5 == 0) graph_.set_loss(f, hardly_);
+        if (select(f) && random_() % of == 0) graph_.set_loss(f, hardly_);
       }
       optimise(kOnTheWay);
     });
@@ -173,12 +252,28 @@ class Search {
     }
     if (!go_on_) return;
     ++found_.starts;
+    reached_.push_back(reached);
     if (std::abs(reached - found_.chi2) > kElsewhere * found_.chi2) ++found_.elsewhere;
     if (!(reached < (1.0 - kLower) * found_.chi2)) return;
     found_.chi2 = reached;
     found_.found_by = name;
     last_ = found_.starts;
     best_ = graph_.values();
+  }
+
+  /// What the starts say about the minima around the lowest.
+  void count_nearly_as_low() {
+    std::ranges::sort(reached_);
+    double before = found_.chi2;
+    for (const double reached : reached_) {
+      if (reached <= (1.0 + kElsewhere) * found_.chi2) {
+        ++found_.in_the_lowest;
+      } else if (reached > (1.0 + kElsewhere) * before &&
+                 reached <= (1.0 + kNearly) * found_.chi2) {
+        before = reached;
+        ++found_.nearly_as_low;
+      }
+    }
   }
 
   double optimise(const Stop& stop) {
@@ -195,9 +290,10 @@ class Search {
   std::function<bool()> wanted_;
   Values given_, best_;
   OtherMinima found_;
-  std::shared_ptr<const Loss> hardly_ = make_weight(0.01);
+  std::shared_ptr<const Loss> hardly_ = make_weight(0.01), fully_ = make_weight(1.0);
   std::mt19937_64 random_{1};        // the same for every graph, on every machine
   double spent_ = 0.0, most_ = 0.0;  // iterations
+  std::vector<double> reached_;      // by each start
   int last_ = 0;                     // the start that led to the best so far
   bool go_on_ = true;
 };

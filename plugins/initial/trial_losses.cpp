@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <utility>
 
 namespace cairn::initial {
@@ -96,6 +97,19 @@ void KeptLosses::put_back() {
   graph_.set_loss(std::shared_ptr<const Loss>());
   for (std::size_t f = 0; f < losses_.size(); ++f) {
     if (losses_[f]) graph_.set_loss(static_cast<int>(f), losses_[f]);
+  }
+}
+
+void set_instead_of_bounded(
+    Graph& graph, const KeptLosses& losses,
+    const std::function<std::shared_ptr<const Loss>(std::shared_ptr<const Loss>)>& instead) {
+  std::map<const Loss*, std::shared_ptr<const Loss>> made;
+  for (int f = 0; f < graph.factor_count(); ++f) {
+    const std::shared_ptr<const Loss>& own = losses.losses()[static_cast<std::size_t>(f)];
+    if (!own) continue;
+    std::shared_ptr<const Loss>& other = made[own.get()];
+    if (!other) other = is_bounded(*own) ? instead(own) : own;
+    graph.set_loss(f, other);
   }
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -13,7 +14,7 @@ namespace cairn::initial {
 /// separates one minimum from another. Each ρ(s) of s = ‖r‖².
 
 /// q ln(1 + s/q): limits what is wrong, and still pulls at it.
-std::shared_ptr<const Loss> make_cauchy(double q);
+std::shared_ptr<const Loss> make_cauchy(double q = 2.3849 * 2.3849);  // as `cauchy` by default
 /// s / (1 + s/q): what is wrong no longer counts.
 std::shared_ptr<const Loss> make_geman_mcclure(double q);
 /// w s: as if the information were w times what it is.
@@ -46,5 +47,10 @@ class KeptLosses {
   Graph& graph_;
   std::vector<std::shared_ptr<const Loss>> losses_;
 };
+
+/// Gives each factor that has a bounded loss `instead` of it, and the others their own.
+void set_instead_of_bounded(
+    Graph& graph, const KeptLosses& losses,
+    const std::function<std::shared_ptr<const Loss>(std::shared_ptr<const Loss>)>& instead);
 
 }  // namespace cairn::initial

@@ -224,6 +224,44 @@ TEST_F(OtherMinimaOf, ASearchThatIsEndedLeavesTheBestSoFar) {
   EXPECT_EQ(graph.values().pools, before.pools);
 }
 
+/// chi2 from the chordal start without a second look.
+double from_chordal(Registry& registry, Graph graph) {
+  registry.make<InitialGuess>("chordal")->compute(graph);
+  return registry.make<Optimizer>("levenberg_marquardt")
+      ->optimize(graph, {.max_iterations = 500})
+      .final_chi2;
+}
+
+TEST_F(OtherMinimaOf, MeasurementsThatContradictEachOtherBeyondChanceAreFound) {
+  Simulation simulation =
+      simulate("landmarks2d:poses=140,sensor=cartesian,noise=5,outliers=6", 1905734870);
+  const double before = from_chordal(registry, simulation.graph.clone());
+  const Summary summary = optimize_by_default(registry, simulation.graph);
+  EXPECT_LT(summary.final_chi2, 0.65 * before);
+  EXPECT_THAT(summary.notes, Contains(AllOf(HasSubstr("looked for other minima, since chi2 is"),
+                                            HasSubstr("times the 232 degrees of freedom"))));
+}
+
+TEST_F(OtherMinimaOf, MeasurementsThatALossRejectsAreTakenBack) {
+  if (!registry.has("loss", "cauchy")) GTEST_SKIP() << "there is no loss cauchy";
+  Simulation simulation =
+      simulate("landmarks2d:poses=126,sensor=bearing_range,outliers=20", 693969830);
+  simulation.graph.set_loss(registry.make<Loss>("cauchy"));
+  const double before = from_chordal(registry, simulation.graph.clone());
+  const Summary summary = optimize_by_default(registry, simulation.graph);
+  EXPECT_LT(summary.final_chi2, 0.65 * before);
+  EXPECT_THAT(summary.notes, Contains(HasSubstr("since losses reject measurements")));
+}
+
+TEST_F(OtherMinimaOf, ManyThatAreNearlyAsLowAreSaid) {
+  // Each turn is known to 6 rad, that is, not at all: what is lowest is a matter of chance.
+  Simulation simulation =
+      simulate("ring:poses=58,laps=3.544,noise=20,rotation_sigma=0.3", 793332501);
+  const Summary summary = optimize_by_default(registry, simulation.graph);
+  EXPECT_THAT(summary.doubts, Contains(AllOf(HasSubstr("chi2 has many minima: "),
+                                             HasSubstr("there may be a lower one than chi2"))));
+}
+
 class BoundedLoss : public OtherMinimaOf, public testing::WithParamInterface<const char*> {
  protected:
   void SetUp() override {
