@@ -86,7 +86,7 @@ def stays_connected(count: int, edges: np.ndarray) -> bool:
 
 
 def base(rng: np.random.Generator, noise: float, rotation: float | None, outliers: int) -> World:
-    """One of the generators, small, with that multiple of its noise, rotation noise [rad] and wrong loop closures."""
+    """One of the generators, small, with that multiple of its noise (and information to match), rotation noise [rad] and wrong loop closures."""
     n = int(rng.integers(20, 200))
     small = int(rng.integers(3, 7))
     options: Dict[str, Dict[str, Any]] = {
@@ -115,7 +115,7 @@ def base(rng: np.random.Generator, noise: float, rotation: float | None, outlier
             raise
         return base(rng, noise, rotation, outliers)  # that world is too small for wrong loop closures
     text = ",".join(f"{key}={value:.4g}" if isinstance(value, float) else f"{key}={value}" for key, value in chosen.items())
-    world = World(f"@{name}:{text} --seed {seed}", graph, truth, expected=noise**2)
+    world = World(f"@{name}:{text} --seed {seed}", graph, truth)
     world.wrong = int(chosen.get("outliers", 0))
     if world.wrong:
         world.defects.append(f"{world.wrong} wrong loop closures")
@@ -201,7 +201,7 @@ def with_scaled_information(rng: np.random.Generator, world: World) -> None:
     for part in factors.values():
         part[2] = part[2] * scale
     world.expected *= scale
-    if not 0.01 < world.expected < 25.0:
+    if not 0.01 < world.expected < 4.0:  # sigmas less than half of what is right: χ² rejects them
         world.defects.append("information of another scale")
     change(world, f"information times {scale:.3g}", joined(variables, factors))
 
@@ -256,13 +256,12 @@ def with_priors(rng: np.random.Generator, world: World) -> None:
     chosen = rng.permutation(len(moved))[: int(rng.integers(1, max(2, len(moved) // 4)))]
     what = str(rng.choice(["position", "pose", "heading"] if planar else ["position", "pose"]))
     sigma = float(rng.choice([0.05, 0.5]))
-    noise = np.sqrt(max(world.expected, 1e-12))
     for k in chosen:
         size = 3 if planar else 6
         turn = size - (1 if planar else 3)
         sigmas = np.full(size, sigma)
         sigmas[turn:] = 0.05
-        delta = noise * sigmas * rng.standard_normal(size)
+        delta = sigmas * rng.standard_normal(size)
         if what == "position":
             delta[turn:] = rng.uniform(-3, 3, size - turn) if planar else 0.0
             sigmas[turn:] = np.inf
@@ -309,8 +308,6 @@ def hard(rng: np.random.Generator) -> World:
     turning = float(rng.choice([0.03, 0.1, 0.3])) if rng.uniform() < 0.5 else None
     noise = float(rng.choice([1.0, 5.0, 20.0]))
     world = base(rng, noise, turning, outliers)
-    if noise > 1.0:
-        world.defects.append(f"noise {noise:.0f} times the weights")
     if rng.uniform() < 0.3:
         with_slips(rng, world)
     vary(rng, world)
