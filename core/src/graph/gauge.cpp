@@ -19,6 +19,7 @@ class Forest {
   }
   /// The smaller index stays the root, so that a component is named by its first variable.
   void join(int a, int b) {
+    if (parent_[a] == parent_[b]) return;  // most have been joined before
     a = root(a);
     b = root(b);
     parent_[std::max(a, b)] = std::min(a, b);
@@ -37,17 +38,19 @@ Gauge resolve_gauge(const Graph& graph) {
   gauge.component.assign(n, -1);
 
   Forest forest(n);
-  std::vector<bool> touched(n, false);
+  std::vector<char> touched(n, false);
   std::vector<std::int64_t> prior_size(n, 0);
   for (const FactorPool& pool : graph.factor_pools()) {
     const std::size_t arity = static_cast<std::size_t>(pool.type->arity());
     const bool absolute = pool.type->absolute_size() > 0;
     for (std::size_t k = 0; k < pool.variables.size(); k += arity) {
-      for (std::size_t a = 0; a < arity; ++a) {
+      const int first = pool.variables[k];
+      touched[first] = true;
+      for (std::size_t a = 1; a < arity; ++a) {
         touched[pool.variables[k + a]] = true;
-        if (a > 0) forest.join(pool.variables[k], pool.variables[k + a]);
+        forest.join(first, pool.variables[k + a]);
       }
-      if (absolute) prior_size[pool.variables[k]] += graph.absolute_size(pool.sequence[k / arity]);
+      if (absolute) prior_size[first] += graph.absolute_size(pool.sequence[k / arity]);
     }
   }
 
@@ -71,8 +74,8 @@ Gauge resolve_gauge(const Graph& graph) {
     }
     gauge.component[v] = gauge.component[root];
     Anchoring& c = components[gauge.component[v]];
-    if (graph.type(v).tangent_size() > c.largest_tangent) {
-      c.largest_tangent = graph.type(v).tangent_size();
+    if (const int size = graph.type(v).tangent_size(); size > c.largest_tangent) {
+      c.largest_tangent = size;
       c.first_largest = v;
     }
     c.fixed = c.fixed || graph.fixed(v);
