@@ -53,9 +53,14 @@ Spelling spelling_of(std::string_view field) {
 }
 
 bool have_common_decimals(std::span<const Spelling> spellings) {
-  return std::ranges::all_of(spellings, [&](const Spelling& s) {
-    return s.has_point && !s.has_exponent && s.decimals == spellings.front().decimals;
+  const Spelling& first = spellings.front();
+  const bool common = std::ranges::all_of(spellings, [&](const Spelling& s) {
+    return s.has_point == first.has_point && !s.has_exponent && s.decimals == first.decimals;
   });
+  // Whole numbers of few digits were written by hand.
+  return common &&
+         (first.has_point ||
+          std::ranges::max(spellings, {}, &Spelling::significant).significant > kFewestDigits);
 }
 
 }  // namespace

@@ -13,9 +13,10 @@ namespace cairn::formats {
 /// What printing may have changed of each number: half a unit of its last digit.
 ///
 /// Numbers that all have the same count of decimals and no exponent were printed with these
-/// decimals (%f). Others have significant digits (%g, %e, the shortest text of a double), as many
-/// as the longest of them shows, since trailing zeros are left out, and 4 at least: what has less
-/// was written by hand, and means what it says. A zero is then exact.
+/// decimals (%f), whole numbers if one has more than four digits. Others have significant digits
+/// (%g, %e, the shortest text of a double), as many as the longest of them shows, since trailing
+/// zeros are left out, and 4 at least: what has less was written by hand, and means what it says. A
+/// zero is then exact.
 void printed_rounding(std::span<const std::string_view> fields, std::span<double> rounding);
 
 /// Whether each number may be the text of a float, whatever digits it has: the float nearest to it

@@ -105,6 +105,23 @@ TEST(PrintedDigits, TheNearestSemidefiniteMatrixIsTakenCountedAndNoted) {
   EXPECT_EQ(r.graph.information_rank(0), 2);
 }
 
+TEST(PrintedDigits, InformationInWholeNumbersIsOffByAHalf) {
+  std::mt19937_64 engine(5);
+  int settled = 0;
+  for (const Kind& kind : kinds()) {
+    for (int k = 0; k < 100; ++k) {
+      Eigen::MatrixXd A = semidefinite(kind.size, kind.size - 1, engine);
+      A *= 1.23456e7 / A.cwiseAbs().maxCoeff();
+      const std::string text = kind.vertices + kind.edge + printed(A, "%.0f");
+      ASSERT_EQ(refusal("g2o", text), "");
+      const Reading r = read("g2o", text);
+      settled += !r.report.notes.empty();
+      EXPECT_LT((unpack(r.information(0), kind.size) - A).norm(), 6.0) << text;
+    }
+  }
+  EXPECT_GT(settled, 100);
+}
+
 /// Front ends keep matrices in single precision, and print them with digits enough for doubles.
 TEST(PrintedDigits, InformationOfFloatsIsReadWithEveryDigitOfADouble) {
   std::mt19937_64 engine(4);
@@ -154,6 +171,9 @@ TEST(PrintedDigits, WhatIsReallyIndefiniteStaysRefused) {
            "0 1 0 5 0 1",                                               // beside an exact zero
            "307121 -243387 -342143 192800 271141 1.6817e+07",  // −40, where digits are below one
            "1 0.999 0.999 1 -0.999 1",       // each pair is possible, the three are not
+           "12345 0 0 -1 0 12345",           // whole numbers, by more than a half
+           "1 1 0 0.99999898672103882 0 1",  // floats, by more than their rounding
+           "1 1 0 0.99999995000000 0 1",     // by the rounding of floats, which they are not
            "1 1 0 0.99998998641967773 0 1",  // floats, by more than their rounding
            "1 1 0 0.99999995000000 0 1",     // by the rounding of floats, which they are not
        }) {
