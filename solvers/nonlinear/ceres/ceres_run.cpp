@@ -115,7 +115,8 @@ Summary with_departures(Graph& graph, const Stop& stop, Observer& observer,
   while (last == Status::converged && stop.tolerance > 0.0) {
     Stop rest = stop;
     rest.max_iterations -= static_cast<int>(std::ssize(summary.iterations));
-    Values best = graph.values(), beside = best;
+    const Values best = graph.values();
+    Values beside = best;
     if (rest.max_iterations <= 0 ||
         !departures.depart(graph, resolve_gauge(graph).held, summary.final_chi2, beside))
       break;
@@ -129,7 +130,7 @@ Summary with_departures(Graph& graph, const Stop& stop, Observer& observer,
       summary.final_chi2 = reached;
       summary.solver = next.solver;
     } else {
-      graph.set_values(std::move(best));
+      graph.set_values(best);
     }
   }
   std::string departed = departures.conclude(graph, summary.final_chi2, reached, last);
