@@ -32,9 +32,12 @@ struct OtherMinima {
   int in_the_lowest = 0;       ///< starts that ended in the lowest minimum
   int nearly_as_low = 0;       ///< minima within 5 % of its chi2 in which starts ended
 
-  /// Five minima or more are nearly as low, and fewer than half of the starts end in the lowest:
-  /// where so many are met, there are others that are not, and one of them may be lower.
-  bool many_nearly_as_low() const { return nearly_as_low >= 5 && 2 * in_the_lowest < starts; }
+  /// A lower one was found, five minima or more are nearly as low, and fewer than half of the
+  /// starts end in the lowest: where so many are met, there are others that are not, and one of
+  /// them may be lower.
+  bool many_nearly_as_low() const {
+    return !found_by.empty() && nearly_as_low >= 5 && 2 * in_the_lowest < starts;
+  }
 };
 
 /// Looks for a lower minimum of chi2 than that in which a graph is, by optimising other starts:
