@@ -11,8 +11,8 @@
 namespace cairn {
 
 /// The factors of a search for free directions, numbered by their places in `FreeSearch::factors`.
-/// Each row of a Jacobian is divided by its largest number: how much a row weighs says nothing of
-/// what it leaves free, and where rows differ by many orders of magnitude the weak ones are
+/// Each row of a Jacobian is divided by its largest number: what a row leaves free does not depend
+/// on how much it weighs, and where rows differ by many orders of magnitude the weak ones are
 /// measurements still.
 class EquilibratedRows {
  public:

@@ -83,11 +83,11 @@ struct FreeSearch {
 /// its factors whose other variables are have full rank in it, and most graphs end there, without
 /// one Jacobian where poses hang together by relative poses. Where it stops, a variable moves by
 /// parameters α of its own, what depends on it by δ = T α, and every row that is then left over
-/// must be zero. Rows are compared with themselves: divided by its largest number, each tells what
-/// it leaves free, and how much it weighs does not matter, so that information of 10⁻³ beside 10¹³
-/// is information. α is free where Σ ‖J T α‖² ≤ 10⁻¹³ (T α)ᵀ D T α, D having for each number the
-/// largest sum of squares in that unit: that is rounding. A direction whose eigenvalue of H, scaled
-/// to unit diagonal, is 10⁻¹⁰ of the largest one is not among them.
+/// must be zero. Rows are compared with themselves: each is divided by its largest number, since
+/// what it leaves free does not depend on how much it weighs, so that information of 10⁻³ beside
+/// 10¹³ is information. α is free where Σ ‖J T α‖² ≤ 10⁻¹³ (T α)ᵀ D T α, D having for each number
+/// the largest sum of squares in that unit: that is rounding. A direction whose eigenvalue of H,
+/// scaled to unit diagonal, is 10⁻¹⁰ of the largest one is not among them.
 CAIRN_API FreeDirections find_free_directions(const LinearRows& rows, const FreeSearch& search);
 
 /// The same for a graph's factors at `values`, weighed by their losses.
