@@ -133,11 +133,12 @@ std::vector<std::string> outside_of_domains(const Graph& graph) {
     std::vector<const double*> pools;
     const FactorView view = graph.view(static_cast<int>(p), graph.values(), pools);
     std::vector<const double*> states(pools.size());
+    std::vector<std::ptrdiff_t> sizes;
+    for (int k = 0; k < pool.type->arity(); ++k) sizes.push_back(pool.type->ambient_size(k));
     std::map<std::string, std::pair<int, int>> reasons;  // the first factor and the number of each
     for (std::size_t entry = 0; entry < view.size; ++entry) {
       for (std::size_t k = 0; k < states.size(); ++k)
-        states[k] = pools[k] + std::ptrdiff_t{view.slots[entry * states.size() + k]} *
-                                   pool.type->ambient_size(static_cast<int>(k));
+        states[k] = pools[k] + view.slots[entry * states.size() + k] * sizes[k];
       const std::string reason = domain->outside(states.data());
       if (!reason.empty())
         ++reasons.try_emplace(reason, pool.sequence[entry], 0).first->second.second;
