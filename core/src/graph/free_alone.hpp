@@ -13,7 +13,7 @@ namespace cairn {
 /// Decided without the sizes of units and weights: of the factors' rows, each factor's scaled to
 /// one and then each column, directions are free that they have below 1e-10, which is rounding. A
 /// point that two factors of at least two numbers have from directions 1e-6 apart is determined,
-/// and not looked at further.
+/// and not examined further.
 FreeDirections free_alone(const Graph& graph, const Gauge& gauge, const Values& values,
                           const LinearRows& rows);
 
