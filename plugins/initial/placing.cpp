@@ -54,6 +54,8 @@ bool Placing::place(int variable, int factor) {
 }
 
 bool Placing::place_in_part(int variable, int factor) {
+  if (graph_.information_rank(factor) == graph_.factor_type(factor).residual_size())
+    return false;  // all of it is measured: it was tried
   const Ends found = ends(variable, factor);
   if (found.target < 0 || found.states.size() < 2) return false;
   const FactorType& type = graph_.factor_type(factor);

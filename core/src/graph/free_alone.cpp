@@ -22,6 +22,7 @@ using Point = Eigen::Vector3d;
 constexpr double kRounding = 1e-10;
 /// Sines of angles between rays that are no matter of rounding.
 constexpr double kApart = 1e-6;
+
 /// Where the variables of a pool are in space, by slot. Empty if they have no place there.
 std::vector<Point> positions(const VariablePool& pool, std::span<const double> states) {
   const Placement* placement = pool.type->placement();
@@ -41,7 +42,7 @@ bool is_point(const VariableType& type) {
          type.tangent_size() == placement->dimension();
 }
 
-/// The points that are seen from two places, by factors that tell a direction at least.
+/// The points that are seen from two places, by factors that measure a direction at least.
 std::vector<char> seen_from_two_places(const Graph& graph, const Values& values) {
   std::vector<std::vector<Point>> at;
   for (std::size_t p = 0; p < graph.variable_pools().size(); ++p)

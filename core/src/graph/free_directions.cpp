@@ -78,10 +78,24 @@ class GraphRows final : public LinearRows {
   const Values& values_;
 };
 
-/// What hangs together with a constant variable by fully measured relative poses without a loss: in
-/// most graphs all poses.
+/// The weights that losses give the factors of a pool at some states; empty: it has no losses.
+std::vector<double> weights_of(const Graph& graph, std::size_t pool, const Values& values) {
+  const FactorPool& factors = graph.factor_pools()[pool];
+  if (std::ranges::all_of(factors.losses, [](int loss) { return loss == 0; })) return {};
+  std::vector<double> norms(factors.size()), weights(factors.size());
+  std::vector<const double*> states;
+  const FactorView view = graph.view(static_cast<int>(pool), values, states);
+  call_factor(*factors.type,
+              [&] { factors.type->squared_norms(view, 0, norms.size(), norms.data()); });
+  graph.weigh(static_cast<int>(pool), 0, norms, {}, weights);
+  return weights;
+}
+
+/// What hangs together with a constant variable by fully measured relative poses that have weight:
+/// in most graphs all poses.
 std::vector<bool> determined_by_whole_relative_poses(const Graph& graph,
-                                                     const std::vector<bool>& held) {
+                                                     const std::vector<bool>& held,
+                                                     const Values& values) {
   std::vector<std::int32_t> parent(held.size());
   std::iota(parent.begin(), parent.end(), 0);
   const auto root = [&](std::int32_t v) {
@@ -91,11 +105,14 @@ std::vector<bool> determined_by_whole_relative_poses(const Graph& graph,
     }
     return v;
   };
-  for (const FactorPool& pool : graph.factor_pools()) {
+  for (std::size_t p = 0; p < graph.factor_pools().size(); ++p) {
+    const FactorPool& pool = graph.factor_pools()[p];
     const int n = pool.type->residual_size();
     if (!pool.type->is_relative() || pool.type->tangent_size(0) != n) continue;
+    const std::vector<double> weights = weights_of(graph, p, values);
     for (std::size_t f = 0; f < pool.size(); ++f) {
-      if (pool.ranks[static_cast<std::size_t>(pool.noises[f])] < n || pool.losses[f] != 0) continue;
+      if (pool.ranks[static_cast<std::size_t>(pool.noises[f])] < n) continue;
+      if (!weights.empty() && !(weights[f] > 0.0)) continue;
       const std::int32_t a = root(pool.variables[2 * f]), b = root(pool.variables[2 * f + 1]);
       parent[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
     }
@@ -179,9 +196,14 @@ bool has_cameras(const Graph& graph) {
 FreeDirections find_free_directions(const Graph& graph, const Gauge& gauge, const Values& values) {
   if (has_cameras(graph)) return free_alone(graph, gauge, values, GraphRows(graph, values));
   if (all_are_whole_relative_poses(graph, gauge)) return {};
-  const std::vector<bool> determined = determined_by_whole_relative_poses(graph, gauge.held);
+  const std::vector<bool> determined =
+      determined_by_whole_relative_poses(graph, gauge.held, values);
   const std::vector<std::int32_t> factors = factors_on_others(graph, determined);
-  if (factors.empty()) return {};
+  if (factors.empty()) {
+    FreeDirections nothing;
+    nothing.everywhere = !graph.has_losses();  // a factor without weight is none
+    return nothing;
+  }
   std::vector<std::int32_t> sizes, units;
   for (int v = 0; v < graph.variable_count(); ++v) {
     sizes.push_back(graph.type(v).tangent_size());
