@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "alignment.hpp"
 #include "cairn/update/placement.hpp"
 
 namespace cairn::initial {
@@ -139,7 +140,11 @@ std::vector<int> Placing::spread_in_part(std::vector<int> start) {
 }
 
 void Placing::finish(std::vector<std::string>& notes) {
-  if (std::ranges::find(placed_, false) == placed_.end()) return;
+  if (std::ranges::find(placed_, false) != placed_.end()) place_the_rest(notes);
+  align_with_positions(graph_);
+}
+
+void Placing::place_the_rest(std::vector<std::string>& notes) {
   std::vector<int> in_part = spread_in_part(all_placed());
   std::vector<int> left;
   for (int v = 0; v < graph_.variable_count(); ++v) {

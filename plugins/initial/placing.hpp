@@ -54,7 +54,8 @@ class Placing {
   /// Ends the placing. What is tied to what is placed by measurements without information in some
   /// directions alone stays in these beside the variable that it is seen from. What no factor ties
   /// to it keeps its state, and places others from there, so that each connected piece is in itself
-  /// as measured. Poses before landmarks. Adds notes about it.
+  /// as measured. Poses before landmarks. Adds notes about it. Then each connected piece goes to
+  /// where its absolute positions were measured (`align_with_positions`).
   void finish(std::vector<std::string>& notes);
 
  private:
@@ -65,6 +66,7 @@ class Placing {
   };
   Ends ends(int variable, int factor) const;
   bool place_in_part(int variable, int factor);
+  void place_the_rest(std::vector<std::string>& notes);
   /// From `start` by measurements in part, and by all that determine a place from there. Returns
   /// the variables that were placed in part.
   std::vector<int> spread_in_part(std::vector<int> start);
