@@ -26,7 +26,7 @@ namespace {
 /// A direction is free where its eigenvalue of the scaled H is below this.
 constexpr double kFree = 1e-13;
 /// What a factor says of a direction is rounding below this part of what all say of its variables.
-constexpr double kBarely = 1e-18;
+constexpr double kBarely = 1e-13;
 /// Of scaled Gram matrices: what is smaller is rounding.
 constexpr double kRounding = 1e-14;
 /// What a basis vector has below this part of its largest number is rounding.

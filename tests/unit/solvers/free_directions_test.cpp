@@ -4,8 +4,11 @@
 // for the whole; a few else).
 #include "cairn/graph/free_directions.hpp"
 
+#include <array>
+#include <cmath>
 #include <cstdlib>
 #include <map>
+#include <numbers>
 #include <random>
 #include <string>
 #include <vector>
@@ -327,6 +330,58 @@ TEST_P(PlantedDirections, AreNamedByEveryEstimator) {
       EXPECT_EQ(report.ok, planted.free == 0) << testing::PrintToString(report.notes);
       expect_named(planted, report.notes);
     }
+  }
+}
+
+/// A drive of n poses with loop closures whose headings are measured at every fifth, far from the
+/// origin. Rounding grows along it.
+Graph drive_with_a_compass(Registry& registry, int n) {
+  const auto pose = registry.variable_type("VERTEX_SE2");
+  const auto edge = registry.factor_type("EDGE_SE2"),
+             prior = registry.factor_type("EDGE_PRIOR_SE2");
+  std::mt19937_64 random(static_cast<std::uint64_t>(n));
+  std::uniform_real_distribution<double> number(-1.0, 1.0);
+  Graph graph;
+  double x = -700.0, y = 400.0, heading = 0.3;
+  for (int v = 0; v < n; ++v) {
+    graph.add_variable(pose, v, std::array{x, y, std::remainder(heading, 2.0 * std::numbers::pi)});
+    x += std::cos(heading) + 0.1 * number(random);
+    y += std::sin(heading) + 0.1 * number(random);
+    heading += 0.4 * number(random);
+  }
+  const std::vector<double> information =
+      pack(Eigen::MatrixXd(Eigen::Vector3d(400.0, 400.0, 100.0).asDiagonal()));
+  const auto link = [&](int a, int b) {
+    graph.add_factor(edge, std::array{a, b},
+                     std::array{number(random), number(random), number(random)}, information);
+  };
+  for (int v = 1; v < n; ++v) link(v - 1, v);
+  for (int k = 0; k < n / 4; ++k) {
+    const int a = static_cast<int>(random() % static_cast<std::uint64_t>(n - 2));
+    link(a, a + 2 + static_cast<int>(random() % static_cast<std::uint64_t>(n - 2 - a)));
+  }
+  for (int v = 2; v < n; v += 5) {
+    graph.add_factor(prior, std::array{v}, std::array{0.0, 0.0, number(random)},
+                     pack(Eigen::MatrixXd(Eigen::Vector3d(0.0, 0.0, 400.0).asDiagonal())));
+  }
+  return graph;
+}
+
+TEST(FreeDirectionsOfDrives, AreNamedHoweverLongTheyAre) {
+  Registry registry;
+  if (!registry.has("types", "slam2d")) GTEST_SKIP() << "without slam2d";
+  for (const int n : {20, 60, 200, 600, 2000}) {
+    Graph graph = drive_with_a_compass(registry, n);
+    const FreeDirections found = find_free_directions(graph);
+    EXPECT_EQ(found.directions.size(), 2U) << n;
+    EXPECT_EQ(found.describe(graph), fmt::format("all {} poses can shift; a prior or one more "
+                                                 "measurement holds them",
+                                                 n));
+    // A position at its end holds all.
+    graph.add_factor(registry.factor_type("EDGE_PRIOR_SE2"), std::array{n - 1},
+                     std::array{0.0, 0.0, 0.0},
+                     pack(Eigen::MatrixXd(Eigen::Vector3d(1e-4, 1e-4, 0.0).asDiagonal())));
+    EXPECT_TRUE(find_free_directions(graph).empty()) << n;
   }
 }
 
