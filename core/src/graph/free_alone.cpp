@@ -84,8 +84,9 @@ MatrixXd null_space(MatrixXd J) {
   Eigen::ColPivHouseholderQR<MatrixXd> qr(J);
   qr.setThreshold(kRounding);
   const Eigen::Index rank = qr.rank();
+  if (rank == n) return MatrixXd(n, 0);
   MatrixXd basis = MatrixXd::Zero(n, n - rank);  // of R P⁻¹, the pivots last
-  if (rank > 0 && rank < n) {
+  if (rank > 0) {
     const MatrixXd R = qr.matrixR().topRows(rank);
     basis.topRows(rank) =
         -R.leftCols(rank).triangularView<Eigen::Upper>().solve(R.rightCols(n - rank));
