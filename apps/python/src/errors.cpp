@@ -11,7 +11,7 @@
 #include "bindings.hpp"
 #include "cairn/io/file_error.hpp"
 #include "cairn/plugin/unknown_name.hpp"
-#include "cairn/runtime/interruption.hpp"
+#include "cairn/runtime/callback_exit.hpp"
 #include "missing.hpp"
 
 namespace cairn::python {
@@ -109,8 +109,8 @@ void translate(std::exception_ptr thrown) {
     PyErr_SetObject(classes.missing_key, made(classes.missing_key, error).ptr());
   } catch (const UnknownName& error) {
     PyErr_SetObject(classes.invalid, made(classes.invalid, error).ptr());
-  } catch (const Interruption& interruption) {
-    raise_again(interruption.cause());
+  } catch (const CallbackExit& exit) {
+    raise_again(exit.cause());
   } catch (const Error& error) {
     const bool invalid = error.code() == ErrorCode::usage || error.code() == ErrorCode::input;
     PyObject* const type = invalid ? classes.invalid : classes.error;

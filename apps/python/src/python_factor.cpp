@@ -11,8 +11,8 @@
 #include <fmt/core.h>
 
 #include "arrays.hpp"
+#include "cairn/runtime/callback_exit.hpp"
 #include "cairn/runtime/error.hpp"
-#include "cairn/runtime/interruption.hpp"
 #include "interrupt.hpp"
 
 namespace cairn::python {
@@ -88,7 +88,7 @@ py::object PythonFactor::call(const py::object& function, std::size_t count,
     }
     return function(*arguments);
   } catch (const py::error_already_set& error) {
-    if (ends_the_call(error)) throw Interruption(std::current_exception());
+    if (ends_the_call(error)) throw CallbackExit(std::current_exception());
     throw Error(ErrorCode::plugin,
                 fmt::format("factor '{}', written in Python: {}", tag(), text_of(error)));
   }

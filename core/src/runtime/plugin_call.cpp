@@ -4,8 +4,8 @@
 #include <exception>
 #include <new>
 
+#include "cairn/runtime/callback_exit.hpp"
 #include "cairn/runtime/error.hpp"
-#include "cairn/runtime/interruption.hpp"
 
 namespace cairn {
 
@@ -14,7 +14,7 @@ void rethrow_as_plugin_error(const std::string& component) {
     throw;
   } catch (const Error&) {
     throw;
-  } catch (const Interruption&) {
+  } catch (const CallbackExit&) {
     throw;
   } catch (const std::bad_alloc&) {
     throw;

@@ -7,7 +7,7 @@
 
 namespace cairn {
 
-/// Throws the exception being handled again: `Error`, `Interruption` and `std::bad_alloc` as they
+/// Throws the exception being handled again: `Error`, `CallbackExit` and `std::bad_alloc` as they
 /// are, everything else as `Error` (plugin) with the message "`component` failed: " and what the
 /// exception says. To be called in a handler.
 [[noreturn]] CAIRN_API void rethrow_as_plugin_error(const std::string& component);

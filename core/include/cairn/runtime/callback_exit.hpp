@@ -11,10 +11,10 @@ namespace cairn {
 /// Thrown by what a call of cairn calls back, to end that call: Ctrl-C in a function written in
 /// Python. It is no `Error`, which may be dealt with on the way, and no component is to blame for
 /// it: `call_plugin` lets it pass as it is.
-class CAIRN_API Interruption : public std::exception {
+class CAIRN_API CallbackExit : public std::exception {
  public:
   /// `cause`: what the caller is to get.
-  explicit Interruption(std::exception_ptr cause)
+  explicit CallbackExit(std::exception_ptr cause)
       : cause_(std::move(cause)) {}  // NOLINT(bugprone-throw-keyword-missing): it is kept
   const std::exception_ptr& cause() const { return cause_; }
   const char* what() const noexcept override { return "interrupted by a function that was called"; }
