@@ -24,6 +24,7 @@ using Eigen::Vector3d;
 
 /// Of iterated closest points; one is enough where positions are measured wholly.
 constexpr int kIterations = 100;
+constexpr std::size_t kMostFixes = 200;
 /// Of a motion that is none, and of an orientation that does not change.
 constexpr double kSmall = 1e-9;
 /// How much the rotation that changes least is preferred, of the spread of the positions.
@@ -155,7 +156,6 @@ double absolute_chi2(const Graph& graph, std::span<const int> factors, const Pos
 struct Part {
   bool held = false;          ///< by a constant variable, or a prior that measures a pose wholly
   std::vector<int> absolute;  ///< factors on single variables
-  std::vector<Fix> fixes;
 };
 
 bool measures_pose(const Graph& graph, int factor) {
@@ -180,10 +180,21 @@ std::vector<Part> parts(const Graph& graph, const Gauge& gauge) {
       Part& part = all[static_cast<std::size_t>(gauge.component[static_cast<std::size_t>(v)])];
       part.held = part.held || measures_pose(graph, f);
       part.absolute.push_back(f);
-      if (!part.held && is_of_position(graph, {f, v})) part.fixes.push_back({f, v});
     }
   }
   return all;
+}
+
+/// Of so many at most, spread over all: more determine six numbers hardly better.
+std::vector<Fix> fixes_of(const Graph& graph, const Part& part) {
+  const std::size_t count = part.absolute.size(), step = (count + kMostFixes - 1) / kMostFixes;
+  std::vector<Fix> fixes;
+  for (std::size_t k = 0; k < count; k += step) {
+    const int f = part.absolute[k];
+    const Fix fix{f, graph.factor_variables(f)[0]};
+    if (is_of_position(graph, fix)) fixes.push_back(fix);
+  }
+  return fixes;
 }
 
 }  // namespace
@@ -195,8 +206,10 @@ void align_with_positions(Graph& graph) {
   std::vector<std::optional<Pose>> motions(all.size());
   for (std::size_t c = 0; c < all.size(); ++c) {
     const Part& part = all[c];
-    if (part.held || part.fixes.empty()) continue;
-    const std::optional<Pose> motion = alignment(graph, part.fixes);
+    if (part.held || part.absolute.empty()) continue;
+    const std::vector<Fix> fixes = fixes_of(graph, part);
+    if (fixes.empty()) continue;
+    const std::optional<Pose> motion = alignment(graph, fixes);
     if (motion &&
         absolute_chi2(graph, part.absolute, *motion) < absolute_chi2(graph, part.absolute, Pose()))
       motions[c] = motion;
