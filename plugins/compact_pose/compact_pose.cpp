@@ -12,6 +12,7 @@
 
 #include "cairn/graph/id_text.hpp"
 #include "cairn/graph/packed.hpp"
+#include "cairn/policy/threshold_search.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/timed.hpp"
 
@@ -238,6 +239,15 @@ double CompactPose::expected_gain(int pose) {
   return mutual_information(expected_, known_displacement(pose).covariance);
 }
 
+/// Whether no match was asked for only since what is expected of one is poor: one as good as the
+/// newest odometry would be informative enough.
+bool CompactPose::silenced() {
+  if (sensor_.size() > 0 || answered_ > 0 || candidates_.empty()) return false;
+  const Candidate& best = *std::ranges::max_element(candidates_, {}, &Candidate::gain);
+  return best.gain <= loop_gain_ &&
+         mutual_information(odometry_, known_displacement(best.pose).covariance) > loop_gain_;
+}
+
 /// Where requests are limited, some of them in vain, the gain that is to be expected of one; it
 /// only falls with other links, as the gain does.
 double CompactPose::worth(int pose, double gain) const {
@@ -379,8 +389,7 @@ LinkReport CompactPose::offer(Id other, std::span<const Factor> measured) {
     if (report.verdict == LinkVerdict::linked || waits) graph_.make_permanent(pose);
     if (report.verdict == LinkVerdict::linked) {
       const bool noted = candidate && watches();
-      if (noted)
-        finder_.note_loop(*test_, dimensions_[candidate->place], report.gain, link.covariance);
+      if (noted) finder_.note_loop(dimensions_[candidate->place], report.gain, link.covariance);
       learnt_.push_back({other, graph_.newest_id(), link.covariance, report.gain, noted});
       use(link);
     } else if (waits) {
@@ -510,6 +519,7 @@ PoseReport CompactPose::end_pose() {
   {
     const Timed timed(report_.seconds.total);
     if (!searched_) search();
+    if (silenced()) typical_.note_silence();
     removed_.clear();
     settle_priors();
     settle_left_out();  // by links of the pose, or its odometry
@@ -540,7 +550,9 @@ bool CompactPose::finish() {
   removed_.clear();
   if (!graph_.newest_kept()) graph_.keep(report_.seconds);
   make_room();
-  return graph_.solve_fully();
+  const bool converged = graph_.solve_fully();
+  if (watches()) noise_scale_ = noise_scale(estimator().graph(), estimator().chi2());
+  return converged;
 }
 
 std::vector<double> CompactPose::newest_state() const {
@@ -558,7 +570,12 @@ OptionValues CompactPose::watching(bool recorded_only) const {
   return {{"strategy", "apal"}, {"search", recorded_only ? "recorded" : "untested"}, {"keep", "0"}};
 }
 
-OptionValues CompactPose::found() const { return finder_.found(range_.probability); }
+OptionValues CompactPose::found() const {
+  static_cast<void>(finder_.sensor());  // throws where there is no loop closure, perhaps no pose
+  SensorRange range = range_;
+  range.noise_scale = noise_scale_;
+  return finder_.found(DistanceTest(graph_.group(), range));
+}
 
 OptionValues CompactPose::scaled(const OptionValues& found, double links, double poses) const {
   OptionValues values = found;

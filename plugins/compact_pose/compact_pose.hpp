@@ -155,6 +155,7 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   Displacement known_displacement(int pose);
   std::optional<Candidate> take_candidate(int pose);
   double expected_gain(int pose);
+  bool silenced();
   double worth(int pose, double gain) const;
   /// The part of the match that ends the way, if the newest pose is to be relocated by this link.
   std::optional<double> relocation(const Link& link) const;
@@ -235,6 +236,7 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   std::unordered_map<Id, Agreement> agreement_;  ///< with a gate
   std::unordered_map<Id, int> removals_;         ///< how often landmarks have left the graph
   ThresholdFinder finder_;                       ///< has nothing unless this `watches`
+  double noise_scale_ = 1.0;                     ///< at the end, where this `watches`
   TypicalMatch typical_;
   MatchRecord record_;
   std::deque<Learnt> learnt_;  ///< of the latest links

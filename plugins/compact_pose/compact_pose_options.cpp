@@ -50,7 +50,10 @@ OptionFields<O> range_fields() {
       .choice("view_axis", &O::view_axis, "of the body, along which the sensor looks")
       .real("probability", &O::probability, 0.0, 1.0,
             "probability of being within range, in each dimension, that makes a pose a candidate "
-            "(s)");
+            "(s)")
+      .real("noise_scale", &O::noise_scale, 0.0, 1.0,
+            "how much smaller the errors of the measurements are than their covariances say, for "
+            "that probability");
 }
 
 }  // namespace
@@ -80,7 +83,7 @@ OptionFields<CompactPoseOptions> CompactPoseOptions::fields() {
                "more, what was measured of the one not seen for longest is given up")
       .text("sensor", &O::sensor, numbers, text_of,
             "expected covariance of a match: standard deviations [m] and [rad], or its upper "
-            "triangle; empty: the median of the latest matches, at first as odometry")
+            "triangle; empty: the lower quartile of the latest matches, at first as odometry")
       .choice("composition", &O::composition,
               "order of the covariance of composed relative poses: Smith and Cheeseman, Barfoot "
               "and Furgale")

@@ -52,6 +52,7 @@ struct CompactPoseOptions {
   RotationTest rotation = RotationTest::magnitude;  ///< what `angle` is of
   Axis view_axis = Axis::z;                         ///< along which the sensor looks
   double probability = 0.1;                         ///< s, of being within, in each dimension
+  double noise_scale = 1.0;     ///< by which the standard deviations of that test are multiplied
   double loop_gain = -1.0;      ///< g_loop [nats]; negative: by the size of a pose
   double pose_gain = -1.0;      ///< g_pose [nats]; negative: likewise
   double prior_gain = -1.0;     ///< of an absolute measurement [nats]; negative: as `loop_gain`
@@ -89,6 +90,7 @@ struct CompactPoseOptions {
         .translation = {range, range_y > 0.0 ? range_y : range, range_z > 0.0 ? range_z : range},
         .rotation = angle,
         .probability = probability,
+        .noise_scale = noise_scale,
         .test = rotation,
         .view_axis = static_cast<int>(view_axis)};
   }

@@ -159,6 +159,7 @@ Dimensions DistanceTest::dimensions(const Displacement& d) const {
 }
 
 double DistanceTest::rotation_probability(double mean, double sigma) const {
+  sigma *= range_.noise_scale;
   if (range_.rotation >= std::numbers::pi) return 1.0;  // no angle is larger
   if (range_.test != RotationTest::view) return probability_within(mean, sigma, range_.rotation);
   return 1.0 - probability_below(std::cos(range_.rotation), mean, sigma);
@@ -167,8 +168,8 @@ double DistanceTest::rotation_probability(double mean, double sigma) const {
 bool DistanceTest::passes(const Dimensions& d) const {
   if (range_.probability <= 0.0) return true;
   for (int r = 0; r < d.translations; ++r) {
-    if (!(probability_within(d.t_mean[r], d.t_sigma[r], range_.translation[r]) >
-          range_.probability))
+    const double sigma = range_.noise_scale * d.t_sigma[r];
+    if (!(probability_within(d.t_mean[r], sigma, range_.translation[r]) > range_.probability))
       return false;
   }
   for (int r = 0; r < d.rotations; ++r) {
@@ -180,18 +181,19 @@ bool DistanceTest::passes(const Dimensions& d) const {
 SensorRange DistanceTest::least_range(const Dimensions& d) const {
   SensorRange least = range_;
   least.translation = {};
-  const double s = range_.probability;
+  const double s = range_.probability, scale = range_.noise_scale;
   for (int r = 0; r < d.translations; ++r)
-    least.translation[r] = range_within(d.t_mean[r], d.t_sigma[r], s);
+    least.translation[r] = range_within(d.t_mean[r], scale * d.t_sigma[r], s);
   least.rotation = 0.0;
   for (int r = 0; r < d.rotations; ++r) {
+    const double sigma = scale * d.r_sigma[r];
     double v = 0.0;
     if (range_.test == RotationTest::view) {
       v = bisect(0.0, std::numbers::pi, s, [&](double angle) {
-        return 1.0 - probability_below(std::cos(angle), d.r_mean[r], d.r_sigma[r]);
+        return 1.0 - probability_below(std::cos(angle), d.r_mean[r], sigma);
       });
     } else {
-      v = std::min(std::numbers::pi, range_within(d.r_mean[r], d.r_sigma[r], s));
+      v = std::min(std::numbers::pi, range_within(d.r_mean[r], sigma, s));
     }
     least.rotation = std::max(least.rotation, v);
   }

@@ -33,6 +33,7 @@ struct SensorRange {
   std::array<double, 3> translation{};  ///< along each axis of the earlier pose [m]
   double rotation = 0.0;                ///< [rad]
   double probability = 0.0;             ///< s, of being within, in each dimension
+  double noise_scale = 1.0;             ///< by which standard deviations are multiplied
   RotationTest test = RotationTest::magnitude;
   int view_axis = 2;  ///< of the body: 0 x, 1 y, 2 z
 

@@ -16,26 +16,35 @@
 namespace cairn::compact {
 namespace {
 
-/// So many of the latest matches tell what the next is worth. An odd number, so that as many are
-/// better as are worse.
+/// So many of the latest matches tell what the next is worth.
 constexpr std::size_t kLatest = 31;
+/// Of them this part is better.
+constexpr double kBetter = 0.25;
+/// So many poses that were not matched for what is expected of a match call it into question.
+constexpr int kSilence = 10;
 /// Logarithms of determinants that differ by less are the same.
 constexpr double kSameSize = 0.01;
 
-}  // namespace
-
-Matrix median_covariance(std::span<const Matrix> covariances) {
-  if (covariances.empty()) throw std::logic_error("the median of no covariance");
-  // Seen from its other end a motion has another covariance with the same determinant: rounding
-  // must not decide between the two.
+/// The sizes of covariances with their positions. Seen from its other end a motion has another
+/// covariance with the same determinant: rounding must not decide between the two.
+std::vector<std::pair<double, std::size_t>> sizes(std::span<const Matrix> covariances) {
   std::vector<std::pair<double, std::size_t>> by_size;
   for (const Matrix& S : covariances) {
     const double size = std::log(Eigen::MatrixXd(S).determinant());
     by_size.emplace_back(std::round(size / kSameSize), by_size.size());
   }
-  const auto middle = by_size.begin() + std::ssize(by_size) / 2;
-  std::ranges::nth_element(by_size, middle);
-  return covariances[middle->second];
+  return by_size;
+}
+
+}  // namespace
+
+Matrix covariance_by_size(std::span<const Matrix> covariances, double part) {
+  if (covariances.empty()) throw std::logic_error("a quantile of no covariance");
+  auto by_size = sizes(covariances);
+  const auto place =
+      by_size.begin() + static_cast<std::ptrdiff_t>(part * static_cast<double>(by_size.size()));
+  std::ranges::nth_element(by_size, place);
+  return covariances[place->second];
 }
 
 void TypicalMatch::note(const Matrix& covariance) {
@@ -45,7 +54,25 @@ void TypicalMatch::note(const Matrix& covariance) {
     latest_[oldest_] = covariance;
     oldest_ = (oldest_ + 1) % kLatest;
   }
-  median_ = median_covariance(latest_);
+  silent_ = 0;
+  update();
+}
+
+void TypicalMatch::update() {
+  quartile_ = latest_.empty() ? Matrix() : covariance_by_size(latest_, kBetter);
+}
+
+void TypicalMatch::note_silence() {
+  if (latest_.empty() || ++silent_ < kSilence) return;
+  silent_ = 0;
+  auto by_size = sizes(latest_);
+  std::ranges::sort(by_size);
+  by_size.resize(by_size.size() / 2);
+  std::vector<Matrix> better;
+  for (const auto& [size, place] : by_size) better.push_back(latest_[place]);
+  latest_ = std::move(better);
+  oldest_ = 0;
+  update();
 }
 
 void TypicalMatch::forget(const Matrix& covariance) {
@@ -55,7 +82,7 @@ void TypicalMatch::forget(const Matrix& covariance) {
   const auto found = std::ranges::find(latest_, covariance);
   if (found == latest_.end()) return;
   latest_.erase(found);
-  median_ = latest_.empty() ? Matrix() : median_covariance(latest_);
+  update();
 }
 
 double percentile(std::vector<double> numbers, double part) {
@@ -67,11 +94,9 @@ double percentile(std::vector<double> numbers, double part) {
   return *place;
 }
 
-void ThresholdFinder::note_loop(const DistanceTest& test, const Dimensions& dimensions, double gain,
+void ThresholdFinder::note_loop(const Dimensions& dimensions, double gain,
                                 const Matrix& covariance) {
-  const SensorRange least = test.least_range(dimensions);
-  loops_.push_back(
-      {*std::ranges::max_element(least.translation), least.rotation, gain, covariance});
+  loops_.push_back({dimensions, gain, covariance});
 }
 
 void ThresholdFinder::forget_loop(double gain, const Matrix& covariance) {
@@ -88,16 +113,17 @@ Matrix ThresholdFinder::sensor() const {
   }
   std::vector<Matrix> covariances;
   for (const Loop& loop : loops_) covariances.push_back(loop.covariance);
-  return median_covariance(covariances);
+  return covariance_by_size(covariances, 0.5);
 }
 
-OptionValues ThresholdFinder::found(double probability) const {
+OptionValues ThresholdFinder::found(const DistanceTest& test) const {
   const Matrix sensor = this->sensor();
   double range = 0.0, angle = 0.0;
   std::vector<double> gains;
   for (const Loop& loop : loops_) {
-    range = std::max(range, loop.range);
-    angle = std::max(angle, loop.angle);
+    const SensorRange least = test.least_range(loop.dimensions);
+    range = std::max(range, *std::ranges::max_element(least.translation));
+    angle = std::max(angle, least.rotation);
     gains.push_back(loop.gain);
   }
   std::string numbers;
@@ -108,7 +134,8 @@ OptionValues ThresholdFinder::found(double probability) const {
   return {
       {"range", fmt::format("{:.9g}", range * up)},
       {"angle", fmt::format("{:.9g}", std::min(angle * up, 3.15))},
-      {"probability", fmt::format("{:.9g}", probability)},
+      {"probability", fmt::format("{:.9g}", test.range().probability)},
+      {"noise_scale", fmt::format("{:.9g}", test.range().noise_scale)},
       {"loop_gain", fmt::format("{:.9g}", std::pow(percentile(gains, 0.9) + 1.0, 1.36) - 1.0)},
       {"pose_gain", fmt::format("{:.9g}", std::pow(percentile(pose_gains_, 0.9) + 1.0, 1.7) - 1.0)},
       {"sensor", numbers}};

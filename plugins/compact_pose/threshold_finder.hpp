@@ -9,22 +9,31 @@
 
 namespace cairn::compact {
 
-/// Of some covariances the median by determinant. Throws `std::logic_error` if there is none.
-Matrix median_covariance(std::span<const Matrix> covariances);
+/// Of some covariances the one that a part of them, by determinant, does not exceed: ½ for the
+/// median. Throws `std::logic_error` if there is none.
+Matrix covariance_by_size(std::span<const Matrix> covariances, double part);
 
-/// Σ̄_y as the latest matches have it: the median of their covariances.
+/// Σ̄_y, what a match can be worth by the latest ones: the lower quartile of their covariances. What
+/// is learnt decides which matches are asked for, so that it must not end by itself: poor matches
+/// would keep from being seen the better ones that others would give.
 class TypicalMatch {
  public:
   void note(const Matrix& covariance);
   /// It was a false match. Does nothing if it is not among the latest any more.
   void forget(const Matrix& covariance);
+  /// A pose that it alone kept from being matched. After ten of them the poorer half is forgotten,
+  /// and the last one too.
+  void note_silence();
   bool known() const { return !latest_.empty(); }
-  const Matrix& covariance() const { return median_; }
+  const Matrix& covariance() const { return quartile_; }
 
  private:
+  void update();
+
   std::vector<Matrix> latest_;  ///< a ring
   std::size_t oldest_ = 0;      ///< once the ring is full
-  Matrix median_;
+  int silent_ = 0;              ///< poses, since a match was noted
+  Matrix quartile_;
 };
 
 /// Finds the thresholds of compact pose SLAM from a sample of the data (section 5.2): all
@@ -32,23 +41,22 @@ class TypicalMatch {
 /// closed, its information gain, and that of the link of every new pose.
 class ThresholdFinder {
  public:
-  void note_loop(const DistanceTest& test, const Dimensions& dimensions, double gain,
-                 const Matrix& covariance);
+  void note_loop(const Dimensions& dimensions, double gain, const Matrix& covariance);
   /// It was a false one.
   void forget_loop(double gain, const Matrix& covariance);
   void note_pose(double gain) { pose_gains_.push_back(gain); }
 
   /// Options of compact_pose: `range` and `angle`, so that every recorded loop closure passes the
-  /// distance test; `loop_gain` = (l₉₀ + 1)^1.36 − 1 and `pose_gain` = (p₉₀ + 1)^1.7 − 1 with the
-  /// 90th percentiles; `sensor`, the median of the loops' covariances. Throws `Error` (input) if
-  /// there was no loop closure.
-  OptionValues found(double probability) const;
+  /// test with its `probability` and `noise_scale`, which are among them; `loop_gain` = (l₉₀ +
+  /// 1)^1.36 − 1 and `pose_gain` = (p₉₀ + 1)^1.7 − 1 with the 90th percentiles; `sensor`, the
+  /// median of the loops' covariances. Throws `Error` (input) if there was no loop closure.
+  OptionValues found(const DistanceTest& test) const;
   /// The median of the loops' covariances, by their determinants. Throws as `found`.
   Matrix sensor() const;
 
  private:
   struct Loop {
-    double range, angle;  // least ones with which it would have passed [m, rad]
+    Dimensions dimensions;  // before it was closed
     double gain;
     Matrix covariance;
   };

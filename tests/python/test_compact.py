@@ -271,6 +271,49 @@ def test_landmarks_and_absolute_measurements_live():
         policy.offer_landmark(cairn.L(9), Factor(cairn.Observation(12, landmark, cairn.Point2()), sigmas=0.05))
 
 
+def circle(poor, poses=400, seed=2):
+    """A robot on a circle of 40 places, of whose matches the first `poor` are 30 times as uncertain as odometry; 40 % of the pairs match.
+
+    Returns the numbers of requests for the poses, and the root mean square of the errors of the latest 40 [m]."""
+    rng = np.random.default_rng(seed)
+    sigmas = np.array([0.02, 0.02, 0.005])
+
+    def truth(k):
+        angle = 2 * np.pi * k / 40
+        return Pose2(5 * np.cos(angle), 5 * np.sin(angle), angle + np.pi / 2)
+
+    def measured(i, k, scale):
+        delta = scale * sigmas * rng.standard_normal(3)
+        return Factor(Between(i, k, truth(i).between(truth(k)).retract(delta)), sigmas=scale * sigmas)
+
+    policy = cairn.PosePolicy("compact_pose", range=5, angle=0.5)
+    matches, requests, errors = 0, [], []
+    for k in range(poses):
+        policy.add_pose(k, measured(k - 1, k, 1) if k else None, value=None if k else truth(0))
+        asked = 0
+        for pair in iter(policy.next_match, None):
+            asked += 1
+            links = None
+            if rng.uniform() < 0.4:
+                links = measured(pair.earlier, k, 30 if matches < poor else 1)
+                matches += 1
+            policy.offer(pair.earlier, links)
+        policy.end_pose()
+        requests.append(asked)
+        errors.append(np.linalg.norm(policy.newest.translation - truth(k).translation))
+    return requests, np.sqrt(np.mean(np.square(errors[-40:])))
+
+
+@pytest.mark.parametrize("poor", [2, 30])
+def test_poor_first_matches_do_not_end_loop_closing(poor):
+    requests, error = circle(poor)
+    good_requests, good_error = circle(0)
+    assert np.sum(requests[-200:]) > 0.7 * np.sum(good_requests[-200:])
+    assert error < 0.15 and good_error < 0.1
+    asked = np.flatnonzero(requests)
+    assert np.diff(asked).max() <= 60  # poses in a row that are not matched
+
+
 def test_a_link_can_be_revoked():
     walk = dense.loop()
     policy = cairn.PosePolicy("compact_pose", strategy="apal", range=1e3, angle=3.14, loop_gain=0, pose_gain=0, probability=0, gate=0, reuse=False)

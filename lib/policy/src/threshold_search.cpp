@@ -68,18 +68,6 @@ double expected_error(PosePolicy& policy, const std::vector<Id>& poses) {
   return expected_ate(estimator, estimator.graph(), poses);
 }
 
-/// √(chi2 / degrees of freedom): by how much residuals are smaller than the file's covariances say;
-/// many files have round numbers there. At most 1: where residuals are larger, the cause may be
-/// outliers, which nothing should get coarser for.
-double noise_scale(PosePolicy& policy) {
-  Estimator& estimator = policy.estimator();
-  const Graph graph = estimator.graph();
-  const std::int64_t dof = degrees_of_freedom(graph, resolve_gauge(graph));
-  const double chi2 = estimator.chi2();
-  if (dof <= 0 || !std::isfinite(chi2)) return 1.0;
-  return std::clamp(std::sqrt(chi2 / static_cast<double>(dof)), kLeastNoiseScale, 1.0);
-}
-
 /// What all trials share.
 struct Sample {
   const PolicyJob& job;
@@ -121,6 +109,12 @@ OptionFinder& finder_of(PosePolicy& policy, const PolicyJob& job) {
 constexpr std::int64_t kLeastLoops = 3;
 
 }  // namespace
+
+double noise_scale(const Graph& graph, double chi2) {
+  const std::int64_t dof = degrees_of_freedom(graph, resolve_gauge(graph));
+  if (dof <= 0 || !std::isfinite(chi2)) return 1.0;
+  return std::clamp(std::sqrt(chi2 / static_cast<double>(dof)), kLeastNoiseScale, 1.0);
+}
 
 bool finds_thresholds(const ComponentSpec& policy, Registry& registry) {
   return query<OptionFinder>(*registry.make<PosePolicy>(policy.name)) != nullptr;
@@ -216,7 +210,7 @@ FoundThresholds find_thresholds(const PolicyJob& job, std::size_t count, double 
     const Graph all = watch.policy().estimator().graph();
     sample.everything.trajectory = trajectory(all);
     sample.everything.poses = spread(kept_poses(watch.policy()));
-    const double noise = noise_scale(watch.policy());
+    const double noise = noise_scale(all, watch.policy().estimator().chi2());
     sample.everything.noise = noise;
     sample.everything.expected = noise * expected_error(watch.policy(), sample.everything.poses);
     found.noise_scale = noise;

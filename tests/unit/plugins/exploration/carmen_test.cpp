@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -194,53 +195,75 @@ TEST(MapLog, ALogWithoutAMeasurementIsRefusedAndTimesMayRunBackwards) {
   EXPECT_EQ(mapped.duration, 7.0);
 }
 
-/// A drive around a hall, with exact scans and odometry that is wrong by a constant turn.
+/// A drive along a hall, a turn on the spot and back, with exact scans and odometry that is wrong
+/// by a constant turn.
+struct HallDrive {
+  ScanLog log;
+  Pose2 truth, odometry;  ///< at the end
+};
+
+HallDrive drive_along(const OccupancyGrid& floor, const Pose2& start, int scans) {
+  const RayCaster rays(floor);
+  HallDrive drive{.log = {}, .truth = start, .odometry = start};
+  for (int k = 0; k < scans; ++k) {
+    LoggedScan logged{
+        .stamp = 0.1 * k,
+        .odometry = drive.odometry,
+        .scan = {.first_angle = -0.5 * pi, .angle_step = pi / 180, .max_range = 8.0, .ranges = {}}};
+    for (int beam = 0; beam <= 180; ++beam) {
+      const double angle = drive.truth.theta() + logged.scan.angle(static_cast<std::size_t>(beam));
+      const RayHit hit = rays.cast(drive.truth.translation(), angle, 8.0);
+      logged.scan.ranges.push_back(static_cast<float>(hit.range));
+    }
+    drive.log.scans.push_back(std::move(logged));
+    const bool turns = k >= 40 && k < 50;
+    const Pose2 motion = turns ? Pose2(0.0, 0.0, 0.1 * pi) : Pose2(0.22, 0.0, 0.0);
+    if (k + 1 == scans) break;
+    drive.truth = drive.truth * motion;
+    drive.odometry = drive.odometry * Pose2(motion.x(), 0.0, motion.theta() + 0.01);
+  }
+  return drive;
+}
+
+/// From 25 starts: where a single drive ends depends on which matches it happens to make.
 TEST(MapLog, AMapIsBuiltAndOdometryCorrected) {
   Registry registry;
   if (!registry.has("registration", "icp")) GTEST_SKIP() << "without icp";
   const OccupancyGrid floor = test::drawn_floor(
       {"##############", "#............#", "#..##........#", "#..##....##..#", "#........##..#",
        "#............#", "#...##.......#", "#............#", "##############"});
-  const RayCaster rays(floor);
-  ScanLog log;
-  Pose2 truth(2.0, 3.5, 0.0), odometry = truth;
   constexpr int kScans = 90;
-  for (int k = 0; k < kScans; ++k) {
-    LoggedScan logged{
-        .stamp = 0.1 * k,
-        .odometry = odometry,
-        .scan = {.first_angle = -0.5 * pi, .angle_step = pi / 180, .max_range = 8.0, .ranges = {}}};
-    for (int beam = 0; beam <= 180; ++beam) {
-      const double angle = truth.theta() + logged.scan.angle(static_cast<std::size_t>(beam));
-      const RayHit hit = rays.cast(truth.translation(), angle, 8.0);
-      logged.scan.ranges.push_back(static_cast<float>(hit.range));
+  RandomNumbers random(1);
+  std::vector<double> errors;  // as parts of odometry's
+  for (int drive = 0; drive < 25; ++drive) {
+    Pose2 start(2.0, 3.5, 0.0);
+    if (drive > 0) {
+      start = {random.uniform(1.6, 2.4), random.uniform(3.2, 3.8), random.uniform(-0.05, 0.05)};
     }
-    log.scans.push_back(std::move(logged));
-    // There, a turn on the spot, and back.
-    const bool turns = k >= 40 && k < 50;
-    const Pose2 motion = turns ? Pose2(0.0, 0.0, 0.1 * pi) : Pose2(0.22, 0.0, 0.0);
-    if (k + 1 == kScans) break;
-    truth = truth * motion;
-    odometry = odometry * Pose2(motion.x(), 0.0, motion.theta() + 0.01);
+    const HallDrive driven = drive_along(floor, start, kScans);
+    const auto policy =
+        registry.make<PosePolicy>(parse_component("compact_pose:range=2,angle=3.14,reuse=false"));
+    const auto icp = registry.make<Registration>("icp");
+    const auto mapper = registry.make<Mapper>("log_odds");
+    ScanSlam slam({*policy, *icp, *mapper, registry});
+    const MappedLog result = map_log(driven.log, slam, {.step = 0.2, .turn = 0.2});
+    EXPECT_TRUE(result.converged);
+    EXPECT_EQ(result.scans, static_cast<std::size_t>(kScans));  // each is a step further
+    EXPECT_GT(slam.counts().loops, 30);
+    const auto error = [&](const Pose2& pose) {
+      return (pose.translation() - driven.truth.translation()).norm();
+    };
+    EXPECT_GT(error(driven.odometry), 1.0);
+    errors.push_back(error(slam.poses().back()) / error(driven.odometry));
+    EXPECT_LT(errors.back(), 0.5) << "drive " << drive;
+    if (drive > 0) continue;
+    // Free floor is free.
+    const MapTruth against = compare_with_floor(slam.map(), floor, {}, {2.0, 3.5});
+    EXPECT_GT(against.seen, 0.9 * against.floor);
+    EXPECT_LT(against.occupied_wrong, 0.02 * against.floor);
   }
-  const auto policy =
-      registry.make<PosePolicy>(parse_component("compact_pose:range=2,angle=3.14,reuse=false"));
-  const auto icp = registry.make<Registration>("icp");
-  const auto mapper = registry.make<Mapper>("log_odds");
-  ScanSlam slam({*policy, *icp, *mapper, registry});
-  const MappedLog result = map_log(log, slam, {.step = 0.2, .turn = 0.2});
-  EXPECT_TRUE(result.converged);
-  EXPECT_EQ(result.scans, static_cast<std::size_t>(kScans));  // each is a step further
-  EXPECT_GT(slam.counts().loops, 30);
-  const auto error = [&](const Pose2& pose) {
-    return (pose.translation() - truth.translation()).norm();
-  };
-  EXPECT_GT(error(odometry), 1.0);
-  EXPECT_LT(error(slam.poses().back()), 0.1);
-  // Free floor is free.
-  const MapTruth against = compare_with_floor(slam.map(), floor, {}, {2.0, 3.5});
-  EXPECT_GT(against.seen, 0.9 * against.floor);
-  EXPECT_LT(against.occupied_wrong, 0.02 * against.floor);
+  std::ranges::sort(errors);
+  EXPECT_LT(errors[errors.size() / 2], 0.1);
 }
 
 }  // namespace

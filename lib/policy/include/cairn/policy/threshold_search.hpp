@@ -24,12 +24,18 @@ struct ThresholdTrial {
   double error() const { return std::max(expected, realised); }
 };
 
+/// √(chi2 / degrees of freedom) of an estimate: by how much residuals are smaller than the
+/// covariances of the measurements say; many files have round numbers there. At most 1: where
+/// residuals are larger, the cause may be outliers, which nothing should get coarser for. 1 where
+/// it is not known.
+CAIRN_API double noise_scale(const Graph& graph, double chi2);
+
 struct FoundThresholds {
   OptionValues options;
   std::vector<ThresholdTrial> trials;
   std::size_t chosen = 0;  ///< the trial with these options, if there is one
-  /// √(chi2 / degrees of freedom) of the sample with everything, at most 1: errors that the
-  /// covariances predict are multiplied by it.
+  /// Of the sample with everything (`cairn::noise_scale`): errors that the covariances predict are
+  /// multiplied by it.
   double noise_scale = 1.0;
   double expected_ate = 0.0;  ///< of the sample with everything [m]
   double tolerance = 0.0;     ///< what the error of a trial may be [m]
