@@ -133,7 +133,8 @@ void suspect_structure(const Graph& graph, GraphSurvey& s) {
     say(fmt::format("{} parts that no factor joins: their relative poses are not determined",
                     parts));
   }
-  if (std::string fixed = contradicting_fixed_poses(graph); !fixed.empty()) say(std::move(fixed));
+  if (std::string fixed = contradicting_fixed_variables(graph); !fixed.empty())
+    say(std::move(fixed));
   if (s.doubled > 0) {
     say(fmt::format("{} on variables that another of the type joins already (doubled edges)",
                     counted(s.doubled, "factor")));

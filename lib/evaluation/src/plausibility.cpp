@@ -40,7 +40,7 @@ std::string implausible_estimate(const Graph& graph, double chi2) {
       "chi2 is {:.3g} times the {} degrees of freedom: this estimate is hardly the right one. ",
       chi2 / static_cast<double>(dof), dof);
   if (const std::string angle = unwrapped_angle(graph); !angle.empty()) return text + angle;
-  if (const std::string fixed = contradicting_fixed_poses(graph); !fixed.empty())
+  if (const std::string fixed = contradicting_fixed_variables(graph); !fixed.empty())
     return text + fixed;
   return text +
          "Either measurements are wrong (a robust loss such as cauchy limits them), or their "
