@@ -14,6 +14,7 @@
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/types/domain.hpp"
+#include "lower_minimum.hpp"
 #include "unwrapped_angle.hpp"
 
 namespace cairn {
@@ -192,8 +193,9 @@ NotesOnEstimate notes_on_estimate(const Graph& graph, double chi2) {
 
 std::vector<std::string> reasons_for_doubt(const Graph& graph, double chi2) {
   std::vector<std::string> sentences;
-  for (const std::string& sentence : {implausible_estimate(graph, chi2), residual_not_finite(graph),
-                                      losses_weigh_nothing(graph), rejection(graph, true)}) {
+  for (const std::string& sentence :
+       {implausible_estimate(graph, chi2), residual_not_finite(graph), losses_weigh_nothing(graph),
+        rejection(graph, true), lower_minimum_nearby(graph, chi2)}) {
     if (!sentence.empty()) sentences.push_back(sentence);
   }
   for (std::string& outside : outside_of_domains(graph)) sentences.push_back(std::move(outside));

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -30,11 +31,13 @@ constexpr int kPoints = 12;
 const std::vector<std::string> kOptimizers{"levenberg_marquardt", "gauss_newton", "dogleg",
                                            "ceres:linear_solver_type=dense_schur",
                                            "ceres_line_search"};
-/// CAIRN_CAMERA_PROBLEMS, or 60.
-std::uint64_t problems() {
-  const char* count = std::getenv("CAIRN_CAMERA_PROBLEMS");
-  return count ? std::strtoull(count, nullptr, 10) : 60;
+std::uint64_t number_of(const char* variable, std::uint64_t otherwise) {
+  const char* text = std::getenv(variable);
+  return text ? std::strtoull(text, nullptr, 10) : otherwise;
 }
+/// CAIRN_CAMERA_PROBLEMS, or 60; from CAIRN_CAMERA_SEED on, or 0.
+std::uint64_t problems() { return number_of("CAIRN_CAMERA_PROBLEMS", 60); }
+std::uint64_t first_seed() { return number_of("CAIRN_CAMERA_SEED", 0); }
 
 enum class Place { in_plane, nearly, centre, behind, far_behind, beyond };
 constexpr int kPlaces = 6;
@@ -158,7 +161,7 @@ TEST_F(SingularCameras, HideNoWorseMinimum) {
     if (!registry.has("optimizer", parse_component(name).name)) continue;
     const auto optimizer = registry.make<Optimizer>(with_some_linear_solver(name));
     std::uint64_t arrived = 0;
-    for (std::uint64_t seed = 0; seed < problems(); ++seed) {
+    for (std::uint64_t seed = first_seed(); seed < first_seed() + problems(); ++seed) {
       const Graph given = problem(seed, true);
       const double best = least(given, problem(seed, false), registry);
       Graph graph = given.clone();
@@ -172,6 +175,28 @@ TEST_F(SingularCameras, HideNoWorseMinimum) {
     // Gauss-Newton needs a gauge that is not free; line search is slow.
     if (name != "gauss_newton" && name != "ceres_line_search") {
       EXPECT_GE(arrived, 98 * problems() / 100) << name;
+    }
+  }
+}
+
+// With hardly more images than unknowns minima lie beside each other, within what is uncertain: one
+// optimizer ends at chi2 4.60, others at 4.03, at the truth's place or elsewhere.
+TEST_F(SingularCameras, OfWhichAnotherMinimumIsLowerAreDoubted) {
+  CAIRN_NEEDS("optimizer", "dogleg");
+  CAIRN_NEEDS("optimizer", "levenberg_marquardt");
+  for (const std::uint64_t seed : {855U, 1747U, 1899U, 1965U}) {
+    double least = std::numeric_limits<double>::infinity();
+    std::vector<std::pair<double, std::vector<std::string>>> ends;
+    for (const char* name : {"dogleg", "levenberg_marquardt"}) {
+      Graph graph = problem(seed, true);
+      const double chi2 =
+          registry.make<Optimizer>(with_some_linear_solver(name))->optimize(graph).final_chi2;
+      least = std::min(least, chi2);
+      ends.emplace_back(chi2, reasons_for_doubt(graph, chi2));
+    }
+    for (const auto& [chi2, doubts] : ends) {
+      if (chi2 <= least * (1.0 + 1e-6)) continue;
+      EXPECT_THAT(doubts, Contains(HasSubstr("there is another minimum"))) << seed;
     }
   }
 }
