@@ -50,8 +50,9 @@ class Until final : public Observer {
 /// the loss is tightened from there.
 ///
 /// How the optimisation went that follows tells more (`look_again`): where poses disagree with
-/// measurements by a large angle, or by some angle and chi2 fell by far, where chi2 is larger than
-/// chance allows, or where a loss is bounded or rejects measurements, other minima are looked for.
+/// measurements by a large angle, or by some angle and chi2 fell by far or, in a small graph, is
+/// not what the information says, where chi2 is larger than chance allows, or where a loss is
+/// bounded or rejects measurements, other minima are looked for.
 class Automatic final : public InitialGuess, public WatchedGuess, public SecondLook {
  public:
   Automatic(int iterations, Candidates candidates)
@@ -93,8 +94,9 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
     const OtherMinima found =
         search_other_minima(graph, starts, *candidates_.optimizer,
                             [&](double part) { return wanted("other starts", part); });
-    return {
-        .lower = !found.found_by.empty(), .notes = in_words(found, reason), .doubt = doubt(found)};
+    return {.lower = !found.found_by.empty(),
+            .notes = in_words(found, reason),
+            .doubt = doubt(found, graph)};
   }
 
  private:
@@ -225,11 +227,18 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
     const std::int64_t dof = degrees_of_freedom(graph, resolve_gauge(graph));
     if (!is_plausible(summary.final_chi2, dof)) return {};
     if (rejects(graph)) return "since losses reject measurements";
-    if (!graph.has_losses() && is_beyond_chance(summary.final_chi2, dof)) {
-      return fmt::format("since chi2 is {:.3g} times the {} degrees of freedom",
-                         summary.final_chi2 / static_cast<double>(dof), dof);
-    }
+    const double ratio = summary.final_chi2 / static_cast<double>(dof);
+    const double chance = graph.has_losses() ? 0.5 : chance_of_more(summary.final_chi2, dof);
+    if (chance < kChance)
+      return fmt::format("since chi2 is {:.3g} times the {} degrees of freedom", ratio, dof);
     const double angle = largest_turn(graph);
+    // Where chi2 says that information is of another scale, it says nothing of measurements.
+    if (few_that_disagree(graph, angle) && std::min(chance, 1.0 - chance) < kUnusual) {
+      return fmt::format(
+          "since poses disagree with a measurement by {:.2g} rad, and chi2 is {:.3g} times the {} "
+          "degrees of freedom",
+          angle, ratio, dof);
+    }
     if (fall > kLargeFall && angle > kSmallAngle)
       return fmt::format("since chi2 fell {:.3g} times from the start", fall);
     if (!(angle > kLargeAngle)) return {};
@@ -241,12 +250,12 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
     return rejected.rejected_loops + rejected.rejected_others > 0;
   }
 
-  /// Whether right measurements with the right information lead to that chi2 less than once in
-  /// 10,000 times: it is χ² at the minimum.
-  static bool is_beyond_chance(double chi2, std::int64_t dof) {
-    if (dof <= 0) return false;
+  /// How likely right measurements with the right information lead to a larger chi2: it is χ² at
+  /// the minimum. Without degrees of freedom chi2 says nothing.
+  static double chance_of_more(double chi2, std::int64_t dof) {
+    if (dof <= 0) return 0.5;
     const boost::math::chi_squared distribution(static_cast<double>(dof));
-    return chi2 > boost::math::quantile(boost::math::complement(distribution, kChance));
+    return boost::math::cdf(boost::math::complement(distribution, chi2));
   }
 
   void small_steps(Graph& graph) {
@@ -264,18 +273,35 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
     return notes;
   }
 
-  static std::string doubt(const OtherMinima& found) {
+  static std::string doubt(const OtherMinima& found, const Graph& graph) {
     if (found.until_the_end) {
       return fmt::format(
           "{} of {} starts ended in other minima, and lower ones were found until the end: there "
           "may be a lower one than chi2 {:.6g}",
           found.elsewhere, found.starts, found.chi2);
     }
-    if (!found.many_nearly_as_low()) return {};
+    if (found.many_nearly_as_low()) {
+      return fmt::format(
+          "chi2 has many minima: {} of {} starts ended in this one, and {} others are within 5 % "
+          "of it: there may be a lower one than chi2 {:.6g}",
+          found.in_the_lowest, found.starts, found.nearly_as_low, found.chi2);
+    }
+    return contradiction(found, graph);
+  }
+
+  /// Where measurements contradict each other beyond chance, which of them give way, and so which
+  /// minimum is met, depends on the start.
+  static std::string contradiction(const OtherMinima& found, const Graph& graph) {
+    const std::int64_t dof = degrees_of_freedom(graph, resolve_gauge(graph));
+    if (graph.has_losses() || found.elsewhere == 0 || !(chance_of_more(found.chi2, dof) < kChance))
+      return {};
+    const double ratio = found.chi2 / static_cast<double>(dof);
+    if (!(ratio > kContradiction)) return {};
     return fmt::format(
-        "chi2 has many minima: {} of {} starts ended in this one, and {} others are within 5 % of "
-        "it: there may be a lower one than chi2 {:.6g}",
-        found.in_the_lowest, found.starts, found.nearly_as_low, found.chi2);
+        "measurements contradict each other, or their information is too large: chi2 is {:.3g} "
+        "times the {} degrees of freedom, and {} of {} starts ended in other minima: there may be "
+        "a lower one than chi2 {:.6g}",
+        ratio, dof, found.elsewhere, found.starts, found.chi2);
   }
 
   /// Whether to go on; once it is not, it never is.
@@ -291,7 +317,8 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
   static constexpr double kLargeFall = 2.5;
   static constexpr double kSmallAngle = 0.1, kLargeAngle = 0.9;  // [rad]
   static constexpr double kToNothing = 1e10;
-  static constexpr double kChance = 1e-4;
+  static constexpr double kChance = 1e-4, kUnusual = 1e-2;  // of χ²
+  static constexpr double kContradiction = 5.0;             // chi2 per degree of freedom
 
   Stop stop_;
   Candidates candidates_;

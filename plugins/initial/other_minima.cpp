@@ -55,6 +55,7 @@ class Search {
       : graph_(graph),
         losses_(graph),
         gauge_(resolve_gauge(graph)),
+        to_the_end_(few_that_disagree(graph, largest_turn(graph))),
         optimizer_(optimizer),
         given_(graph.values()),
         best_(graph.values()) {
@@ -71,7 +72,8 @@ class Search {
     try_robust("cauchy", make_cauchy, 1.0);
     try_robust("geman_mcclure", make_geman_mcclure, 4.0);
     for (const double turns : {1.0, -1.0}) try_turned(turns, 0);
-    if (!rejected().empty() || found_.elsewhere > 0 || !found_.found_by.empty()) try_more(starts);
+    if (to_the_end_ || !rejected().empty() || found_.elsewhere > 0 || !found_.found_by.empty())
+      try_more(starts);
     graph_.set_values(std::move(best_));
     found_.until_the_end = !found_.found_by.empty() && found_.starts - last_ <= found_.starts / 4;
     count_nearly_as_low();
@@ -286,6 +288,7 @@ class Search {
   Graph& graph_;
   KeptLosses losses_;
   Gauge gauge_;
+  bool to_the_end_;
   Optimizer& optimizer_;
   std::function<bool()> wanted_;
   Values given_, best_;
@@ -328,6 +331,10 @@ double largest_turn(const Graph& graph) {
     }
   }
   return std::acos(std::clamp(0.5 * (least - 1.0), -1.0, 1.0));
+}
+
+bool few_that_disagree(const Graph& graph, double angle) {
+  return graph.variable_count() <= kFewVariables && angle > kTurnOfFew;
 }
 
 }  // namespace cairn::initial

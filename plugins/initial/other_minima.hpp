@@ -14,6 +14,11 @@ namespace cairn::initial {
 /// More are not searched.
 inline constexpr int kMostVariables = 5000;
 
+/// A graph of up to 400 variables, whose search takes less than a second, is searched on smaller
+/// signs, and to the end: its poses disagree with a measurement by more than this [rad].
+inline constexpr int kFewVariables = 400;
+inline constexpr double kTurnOfFew = 0.2;
+
 /// A start by its name, such as "spanning_tree".
 struct NamedStart {
   std::string name;
@@ -48,15 +53,19 @@ struct OtherMinima {
 ///     up to these,
 ///   - a fifth of the factors, or half of the loop closures, at random, almost left out,
 ///   - factors that losses reject with their full weight.
-/// It ends where the first of these all lead back and losses reject nothing, and where 32 starts
-/// at random lead to nothing lower. A start under bounded losses is optimised by losses that are
-/// tightened to them. `wanted`: whether to go on, asked between the starts and in each iteration.
-/// The time is bounded by a number of iterations that falls with the size of the graph; none are
-/// left for more than `kMostVariables`.
+/// It ends where the first of these all lead back and losses reject nothing (not where few poses
+/// disagree with a measurement, `kTurnOfFew`), and where 32 starts at random lead to nothing lower.
+/// A start under bounded losses is optimised by losses that are tightened to them. `wanted`:
+/// whether to go on, asked between the starts and in each iteration. The time is bounded by a
+/// number of iterations that falls with the size of the graph; none are left for more than
+/// `kMostVariables`.
 OtherMinima search_other_minima(Graph& graph, const std::vector<NamedStart>& starts,
                                 Optimizer& optimizer, const std::function<bool(double)>& wanted);
 
 /// The largest angle by which the poses of a relative measurement disagree with it [rad].
 double largest_turn(const Graph& graph);
+
+/// Whether the graph has few variables, and `angle`, its largest turn, is large for that.
+bool few_that_disagree(const Graph& graph, double angle);
 
 }  // namespace cairn::initial

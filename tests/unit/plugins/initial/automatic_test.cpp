@@ -242,6 +242,96 @@ TEST_F(OtherMinimaOf, MeasurementsThatContradictEachOtherBeyondChanceAreFound) {
                                             HasSubstr("times the 232 degrees of freedom"))));
 }
 
+/// As if sigmas were larger by the root of that.
+void scale_information(Graph& graph, double by) {
+  for (int f = 0; f < graph.factor_count(); ++f) {
+    std::vector<double> information(graph.information(f).begin(), graph.information(f).end());
+    for (double& entry : information) entry *= by;
+    const std::vector<double> measured(graph.measurement(f).begin(), graph.measurement(f).end());
+    graph.set_measurement(f, measured, information);
+  }
+}
+
+TEST_F(OtherMinimaOf, ASmallGraphWhoseInformationIsTooSmallAreFound) {
+  // chi2 is far below what it may be, whatever is wrong.
+  struct Case {
+    const char* world;
+    std::uint64_t seed;
+  };
+  for (const Case& one : {Case{"landmarks2d:poses=80,sensor=cartesian,noise=20,outliers=5", 3},
+                          Case{"city:poses=100,noise=20,outliers=6", 7},
+                          Case{"ring:poses=80,noise=5,outliers=4", 3}}) {
+    SCOPED_TRACE(one.world);
+    Simulation simulation = simulate(one.world, one.seed);
+    scale_information(simulation.graph, 1e-4);
+    const double before = from_chordal(registry, simulation.graph.clone());
+    const Summary summary = optimize_by_default(registry, simulation.graph);
+    EXPECT_LT(summary.final_chi2, 0.9 * before);
+    EXPECT_THAT(summary.notes,
+                Contains(AllOf(HasSubstr("looked for other minima, since poses disagree with a"),
+                               HasSubstr(" rad, and chi2 is 0.00"))));
+  }
+}
+
+TEST_F(OtherMinimaOf, ASmallGraphWhoseChi2IsAsItShouldBeAreNotSought) {
+  if (!registry.has("types", "slam3d")) GTEST_SKIP() << "there are no types slam3d";
+  // Poses disagree with measurements by as much as above, and as much as their information says.
+  Simulation simulation = simulate("grid3d:nx=4,ny=4,nz=4,noise=5", 3);
+  const auto made = registry.make<InitialGuess>("auto");
+  int looks = 0;
+  query<WatchedGuess>(*made)->watch([&](std::string_view what, double) {
+    looks += what == "other starts";
+    return true;
+  });
+  made->compute(simulation.graph);
+  const Summary summary = optimize(simulation.graph);
+  EXPECT_THAT(query<SecondLook>(*made)->look_again(simulation.graph, summary).notes, IsEmpty());
+  EXPECT_EQ(looks, 0);
+}
+
+/// The odometry and the last loop closure.
+Graph with_one_loop(const Graph& graph) {
+  Graph result;
+  std::vector<int> kept;
+  int last = -1;
+  for (int v = 0; v < graph.variable_count(); ++v)
+    result.add_variable(graph.type_of(v), graph.id(v), graph.state(v));
+  for (int f = 0; f < graph.factor_count(); ++f) {
+    const auto ends = graph.factor_variables(f);
+    if (std::abs(graph.id(ends[1]) - graph.id(ends[0])) == 1)
+      kept.push_back(f);
+    else
+      last = f;
+  }
+  kept.push_back(last);
+  for (const int f : kept) {
+    const auto ends = graph.factor_variables(f);
+    result.add_factor(graph.type_of_factor(f), std::vector<int>(ends.begin(), ends.end()),
+                      graph.measurement(f), graph.information(f));
+  }
+  return result;
+}
+
+TEST_F(OtherMinimaOf, AFewPosesThatTurnFarAreSoughtToTheEnd) {
+  // The first starts all lead back, and one at random does not.
+  if (!registry.has("types", "slam3d")) GTEST_SKIP() << "there are no types slam3d";
+  for (const std::uint64_t seed : {14, 44}) {
+    Graph graph = with_one_loop(
+        simulate("sphere:turns=3,poses_per_turn=12,noise=5,rotation_sigma=0.1", seed).graph);
+    const double before = from_chordal(registry, graph.clone());
+    EXPECT_LT(optimize_by_default(registry, graph).final_chi2, 0.75 * before);
+  }
+}
+
+TEST_F(OtherMinimaOf, MeasurementsThatContradictEachOtherAreDoubted) {
+  Simulation simulation = simulate("manhattan:poses=60,loop_density=0.5,noise=5,outliers=4", 2);
+  const Summary summary = optimize_by_default(registry, simulation.graph);
+  EXPECT_EQ(summary.status, Status::converged);
+  EXPECT_THAT(summary.doubts,
+              Contains(AllOf(HasSubstr("measurements contradict each other, or their information"),
+                             HasSubstr(" starts ended in other minima"))));
+}
+
 TEST_F(OtherMinimaOf, MeasurementsThatALossRejectsAreTakenBack) {
   if (!registry.has("loss", "cauchy")) GTEST_SKIP() << "there is no loss cauchy";
   Simulation simulation =
