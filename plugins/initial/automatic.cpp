@@ -80,6 +80,7 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
       notes = choose(graph);
     }
     if (!wanted_) notes.push_back("interrupted: not all starts were tried");
+    chosen_ = graph.values();
     return notes;
   }
 
@@ -90,9 +91,10 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
     const std::vector<NamedStart> starts = {
         {"as_given", [&](Graph& of) { of.set_values(given_); }},
         {"spanning_tree", [&](Graph& of) { make_spanning_tree({})->compute(of); }},
+        {"its own start", [&](Graph& of) { of.set_values(chosen_); }},
         {"incremental", [&](Graph& of) { small_steps(of); }, 75}};
     const OtherMinima found =
-        search_other_minima(graph, starts, *candidates_.optimizer,
+        search_other_minima(graph, starts, {candidates_.optimizer.get(), candidates_.other.get()},
                             [&](double part) { return wanted("other starts", part); });
     return {.lower = !found.found_by.empty(),
             .notes = in_words(found, reason),
@@ -299,8 +301,8 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
     if (!(ratio > kContradiction)) return {};
     return fmt::format(
         "measurements contradict each other, or their information is too large: chi2 is {:.3g} "
-        "times the {} degrees of freedom, and {} of {} starts ended in other minima: there may be "
-        "a lower one than chi2 {:.6g}",
+        "times the {} degrees of freedom, and {} of {} starts ended in other minima than that of "
+        "chi2 {:.6g}",
         ratio, dof, found.elsewhere, found.starts, found.chi2);
   }
 
@@ -322,7 +324,7 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
 
   Stop stop_;
   Candidates candidates_;
-  Values given_;
+  Values given_, chosen_;
   std::string rejected_;  // starts, with the numbers that decided
   GoOn go_on_;
   bool wanted_ = true;

@@ -101,6 +101,7 @@ struct AutomaticOptions {
 struct Candidates {
   std::unique_ptr<InitialGuess> chordal;
   std::unique_ptr<Optimizer> optimizer;  ///< for trials
+  std::unique_ptr<Optimizer> other;      ///< of another kind, which ends in other minima
   std::unique_ptr<InitialGuess> incremental;
   std::unique_ptr<InitialGuess> small_steps;  ///< incremental, with 50 optimisations
 };

@@ -51,12 +51,14 @@ struct Part {
 
 class Search {
  public:
-  Search(Graph& graph, Optimizer& optimizer, const std::function<bool(double)>& wanted)
+  Search(Graph& graph, const SearchOptimizers& optimizers,
+         const std::function<bool(double)>& wanted)
       : graph_(graph),
         losses_(graph),
         gauge_(resolve_gauge(graph)),
         to_the_end_(few_that_disagree(graph, largest_turn(graph))),
-        optimizer_(optimizer),
+        optimizers_(optimizers),
+        optimizer_(optimizers.one),
         given_(graph.values()),
         best_(graph.values()) {
     found_.chi2 = found_.before = chi2(graph);
@@ -90,7 +92,16 @@ class Search {
     });
   }
 
+  void use_other(bool other) {
+    optimizer_ = other && optimizers_.other ? optimizers_.other : optimizers_.one;
+  }
+
   void try_more(const std::vector<NamedStart>& starts) {
+    use_other(true);
+    for (const NamedStart& start : starts) {
+      if (optimizers_.other && start.iterations == 0.0) try_start(start);
+    }
+    use_other(false);
     for (const NamedStart& start : starts) {
       if (start.iterations > 0.0) try_start(start);
     }
@@ -100,7 +111,10 @@ class Search {
     for (const int axis : {1, 2}) {
       for (const double turns : {1.0, -1.0}) try_turned(turns, axis);
     }
-    for (int k = 0; found_.starts - last_ < kInVain && k < kMostTries; ++k) try_at_random(k);
+    for (int k = 0; found_.starts - last_ < kInVain && k < kMostTries; ++k) {
+      use_other(k / 4 % 2 == 1);
+      try_at_random(k);
+    }
   }
 
   void try_at_random(int k) {
@@ -280,7 +294,7 @@ class Search {
 
   double optimise(const Stop& stop) {
     WhileWanted observer(wanted_);
-    const Summary summary = optimizer_.optimize(graph_, stop, observer);
+    const Summary summary = optimizer_->optimize(graph_, stop, observer);
     spent_ += static_cast<double>(summary.iterations.size());
     return summary.final_chi2;
   }
@@ -289,7 +303,8 @@ class Search {
   KeptLosses losses_;
   Gauge gauge_;
   bool to_the_end_;
-  Optimizer& optimizer_;
+  SearchOptimizers optimizers_;
+  Optimizer* optimizer_;  ///< by which the next start is optimised
   std::function<bool()> wanted_;
   Values given_, best_;
   OtherMinima found_;
@@ -304,8 +319,9 @@ class Search {
 }  // namespace
 
 OtherMinima search_other_minima(Graph& graph, const std::vector<NamedStart>& starts,
-                                Optimizer& optimizer, const std::function<bool(double)>& wanted) {
-  return Search(graph, optimizer, wanted).run(starts);
+                                const SearchOptimizers& optimizers,
+                                const std::function<bool(double)>& wanted) {
+  return Search(graph, optimizers, wanted).run(starts);
 }
 
 double largest_turn(const Graph& graph) {

@@ -14,10 +14,16 @@ namespace cairn::initial {
 /// More are not searched.
 inline constexpr int kMostVariables = 5000;
 
-/// A graph of up to 400 variables, whose search takes less than a second, is searched on smaller
-/// signs, and to the end: its poses disagree with a measurement by more than this [rad].
+/// A graph of up to 400 variables is searched on smaller signs, and to the end: its poses disagree
+/// with a measurement by more than this [rad].
 inline constexpr int kFewVariables = 400;
 inline constexpr double kTurnOfFew = 0.2;
+
+/// From one start two optimizers may end in different minima; null where there is no other.
+struct SearchOptimizers {
+  Optimizer* one = nullptr;
+  Optimizer* other = nullptr;
+};
 
 /// A start by its name, such as "spanning_tree".
 struct NamedStart {
@@ -52,7 +58,10 @@ struct OtherMinima {
 ///   - the trajectory with further full turns along its way, or a part of it: headings are known
 ///     up to these,
 ///   - a fifth of the factors, or half of the loop closures, at random, almost left out,
-///   - factors that losses reject with their full weight.
+///   - factors that losses reject with their full weight,
+///
+/// and by the other optimizer, if there is one, each of the starts that cost nothing and every
+/// second four at random.
 /// It ends where the first of these all lead back and losses reject nothing (not where few poses
 /// disagree with a measurement, `kTurnOfFew`), and where 32 starts at random lead to nothing lower.
 /// A start under bounded losses is optimised by losses that are tightened to them. `wanted`:
@@ -60,7 +69,8 @@ struct OtherMinima {
 /// number of iterations that falls with the size of the graph; none are left for more than
 /// `kMostVariables`.
 OtherMinima search_other_minima(Graph& graph, const std::vector<NamedStart>& starts,
-                                Optimizer& optimizer, const std::function<bool(double)>& wanted);
+                                const SearchOptimizers& optimizers,
+                                const std::function<bool(double)>& wanted);
 
 /// The largest angle by which the poses of a relative measurement disagree with it [rad].
 double largest_turn(const Graph& graph);

@@ -29,6 +29,10 @@ Candidates candidates(const AutomaticOptions& options, Registry& registry) {
     return make_chordal({}, registry.make<LinearSolver>(options.linear_solver));
   });
   result.optimizer = made_if_there(same_optimizer, optimizer);
+  result.other = made_if_there(true, [&] {
+    return registry.make<Optimizer>(options.optimizer.starts_with("dogleg") ? defaults.optimizer
+                                                                            : "dogleg");
+  });
   result.incremental =
       made_if_there(same_optimizer, [&] { return make_incremental({.step = 0}, optimizer()); });
   result.small_steps =
