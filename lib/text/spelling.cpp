@@ -2,9 +2,11 @@
 #include "cairn/text/spelling.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
+#include <cstdlib>
+#include <numeric>
 #include <tuple>
-#include <vector>
 
 #include <fmt/format.h>
 
@@ -16,24 +18,30 @@ constexpr std::size_t kLongestWord = 100;
 
 char lower(char c) { return static_cast<char>(std::tolower(static_cast<unsigned char>(c))); }
 
-/// Optimal string alignment distance: insert, delete, replace, swap of neighbours.
-int edit_distance(std::string_view a, std::string_view b) {
-  const std::size_t columns = b.size() + 1;
-  std::vector<int> before_last(columns), last(columns), current(columns);
-  for (std::size_t j = 0; j < columns; ++j) last[j] = static_cast<int>(j);
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    current[0] = static_cast<int>(i);
-    for (std::size_t j = 1; j < columns; ++j) {
-      const bool same = lower(a[i - 1]) == lower(b[j - 1]);
+/// Optimal string alignment distance: insert, delete, replace, swap of neighbours; `limit` if it is
+/// that or more, which most pairs show after a few letters. `word` is lower case.
+int edit_distance(std::string_view word, std::string_view candidate, int limit) {
+  const auto columns = static_cast<int>(word.size()), size = static_cast<int>(candidate.size());
+  if (std::abs(columns - size) >= limit) return limit;
+  std::array<std::array<int, kLongestWord + 1>, 3> rows;  // the last three
+  std::iota(rows[0].begin(), rows[0].begin() + columns + 1, 0);
+  char letter_before = '\0';
+  for (int i = 1; i <= size; ++i) {
+    const auto &before_last = rows[(i + 1) % 3], &last = rows[(i + 2) % 3];
+    auto& current = rows[i % 3];
+    const char letter = lower(candidate[i - 1]);
+    int least = current[0] = i;
+    for (int j = 1; j <= columns; ++j) {
+      const bool same = letter == word[j - 1];
       current[j] = std::min({last[j] + 1, current[j - 1] + 1, last[j - 1] + (same ? 0 : 1)});
-      if (i > 1 && j > 1 && lower(a[i - 1]) == lower(b[j - 2]) &&
-          lower(a[i - 2]) == lower(b[j - 1]))
+      if (i > 1 && j > 1 && letter == word[j - 2] && letter_before == word[j - 1])
         current[j] = std::min(current[j], before_last[j - 2] + 1);
+      least = std::min(least, current[j]);
     }
-    std::swap(before_last, last);
-    std::swap(last, current);
+    if (least >= limit) return limit;  // nor will a swap, which looks two rows back and costs 1
+    letter_before = letter;
   }
-  return last[b.size()];
+  return std::min(rows[size % 3][columns], limit);
 }
 
 /// "lm" of levenberg_marquardt, "cholesky" of block_cholesky, "solver" of linear-solver.
@@ -55,8 +63,10 @@ std::string nearest_spelling(std::string_view word, std::span<const std::string>
   for (const std::string& candidate : candidates)  // EDGE_SE3 is EDGE_SE3:QUAT, not EDGE_SE2
     if (candidate.starts_with(word) && candidate[word.size()] == ':') return candidate;
   int best_distance = static_cast<int>(std::max<std::size_t>(2, word.size() / 3)) + 1;
+  std::string lower_word(word);
+  std::ranges::transform(lower_word, lower_word.begin(), lower);
   for (const std::string& candidate : candidates) {
-    const int distance = edit_distance(word, candidate);
+    const int distance = edit_distance(lower_word, candidate, best_distance);
     if (distance < best_distance) std::tie(best_distance, best) = std::tie(distance, candidate);
   }
   if (!best.empty()) return best;
