@@ -132,7 +132,8 @@ class G2oReader {
       ++unused_parameters_[shown(tag)];
       return;
     } else {
-      return unknown_tag(scanner_, draft_, options_, tags_on_offer(), other_words_);
+      return unknown_tag(
+          scanner_, draft_, options_, [this] { return tags_on_offer(); }, other_words_);
     }
     (*tags_.find(tag))(scanner_, draft_);
   }

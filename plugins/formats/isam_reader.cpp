@@ -44,7 +44,7 @@ class IsamReader {
         (*reader)(scanner_, draft_);
       } else {
         refuse_vertices();
-        unknown_tag(scanner_, draft_, options_, tags_.tags());
+        unknown_tag(scanner_, draft_, options_, [this] { return tags_.tags(); });
       }
     }
     if (landmark_kind_ >= 0) separate_landmarks();

@@ -68,7 +68,7 @@ class PyfgReader {
       if (const LineReader* reader = tags_.find(scanner_.tag())) {
         (*reader)(scanner_, draft_);
       } else {
-        unknown_tag(scanner_, draft_, draft_.options(), tags_.tags());
+        unknown_tag(scanner_, draft_, draft_.options(), [this] { return tags_.tags(); });
       }
     }
     refuse_ranges();

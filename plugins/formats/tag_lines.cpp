@@ -49,13 +49,14 @@ std::string remedy(std::string_view tag, std::span<const std::string> on_offer,
 }  // namespace
 
 void unknown_tag(const Scanner& scanner, Draft& draft, const ReadOptions& options,
-                 std::span<const std::string> on_offer, std::span<const std::string> commands) {
+                 const std::function<std::vector<std::string>()>& on_offer,
+                 std::span<const std::string> commands) {
   if (options.skip_unknown) {
     draft.add_skipped(scanner);
     return;
   }
   scanner.fail(fmt::format("unknown tag '{}'{} (ReadOptions::skip_unknown leaves such lines out){}",
-                           shown(scanner.tag()), remedy(scanner.tag(), on_offer, commands),
+                           shown(scanner.tag()), remedy(scanner.tag(), on_offer(), commands),
                            draft.plugin_problems()));
 }
 

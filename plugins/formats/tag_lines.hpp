@@ -53,11 +53,12 @@ class TagTable {
 void read_fix(Scanner& scanner, Draft& draft);
 
 /// A line with an unknown tag: counted where that was asked for, else an error with the tag of
-/// `on_offer` or of `commands` that is nearest, or with all tags where none is near. `commands`:
-/// the other words that lines of a stream begin with, which stand for the many tags there, since a
-/// stream may have such lines again and again.
+/// `on_offer()`, which is asked only then, or of `commands` that is nearest, or with all tags where
+/// none is near. `commands`: the other words that lines of a stream begin with, which stand for the
+/// many tags there, since a stream may have such lines again and again.
 void unknown_tag(const Scanner& scanner, Draft& draft, const ReadOptions& options,
-                 std::span<const std::string> on_offer, std::span<const std::string> commands = {});
+                 const std::function<std::vector<std::string>()>& on_offer,
+                 std::span<const std::string> commands = {});
 
 /// Reads a factor line whose measurement stands there as it is kept: ids, measurement, information.
 void read_factor(Scanner& scanner, Draft& draft, std::int32_t kind,

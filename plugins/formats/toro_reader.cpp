@@ -62,7 +62,7 @@ class ToroReader {
       if (const LineReader* reader = tags_.find(scanner_.tag())) {
         (*reader)(scanner_, draft_);
       } else {
-        unknown_tag(scanner_, draft_, options_, tags_.tags());
+        unknown_tag(scanner_, draft_, options_, [this] { return tags_.tags(); });
       }
     }
     if (!landmarks_.empty()) sort_out_landmarks();
