@@ -66,9 +66,9 @@ std::optional<StampUnit> unit_in(std::string_view field) {
 
 /// Whether a line that is no comment names the columns of a trajectory.
 bool is_names(std::string_view line) {
+  if (std::isalpha(static_cast<unsigned char>(line.front())) == 0) return false;
   const std::vector<std::string> fields = fields_of(line);
-  if (fields.size() < 3 || std::isalpha(static_cast<unsigned char>(line.front())) == 0)
-    return false;
+  if (fields.size() < 3) return false;
   const std::string& first = fields.front();
   return first == "t" || first.find("time") != std::string::npos ||
          first.find("stamp") != std::string::npos;
@@ -76,9 +76,9 @@ bool is_names(std::string_view line) {
 
 /// By commas or semicolons. Not "1,5 2,5 0,5", whose commas are those of decimals.
 bool is_separated_by_marks(std::string_view line) {
+  if (separators_of(line) == kBlanks) return false;
   const std::vector<std::string> fields = fields_of(line);
-  return separators_of(line) != kBlanks && fields.size() >= 3 &&
-         std::ranges::all_of(fields, [](const std::string& field) {
+  return fields.size() >= 3 && std::ranges::all_of(fields, [](const std::string& field) {
            return !field.empty() && field.find_first_of(kBlanks) == std::string::npos;
          });
 }
