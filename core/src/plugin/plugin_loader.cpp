@@ -188,7 +188,9 @@ Sidecar read_sidecar(const fs::path& file) {
   Sidecar sidecar{text_of(object, "name"),    text_of(object, "version"),
                   text_of(object, "licence"), text_of(object, "description"),
                   text_of(object, "file"),    {}};
-  if (sidecar.library.has_parent_path() || sidecar.library.extension() != ".so")
+  // What is opened would end at a zero.
+  if (sidecar.library.has_parent_path() || sidecar.library.extension() != ".so" ||
+      sidecar.library.native().find('\0') != std::string::npos)
     throw broken("names no file of its own folder");
   sidecar.library = file.parent_path() / sidecar.library;
   const boost::json::value* offers = object->if_contains("offers");

@@ -35,8 +35,7 @@ int report_to = -1;
 void report(char outcome, std::string_view what = {}) {
   std::array<char, 1024> text;
   text[0] = outcome;
-  const std::size_t size = std::min(what.size(), text.size() - 1);
-  std::memcpy(text.data() + 1, what.data(), size);
+  const std::size_t size = what.copy(text.data() + 1, text.size() - 1);
   static_cast<void>(!::write(report_to, text.data(), size + 1));  // at once: shorter than PIPE_BUF
 }
 

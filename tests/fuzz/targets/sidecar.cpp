@@ -63,7 +63,8 @@ void run(Bytes bytes) {
   std::size_t asked = 0;
   for (const Offer& offer : offers) {
     expect(offer.file.parent_path() == folder() && offer.file.has_filename() &&
-               offer.file.filename() != "." && offer.file.filename() != "..",
+               offer.file.filename() != "." && offer.file.filename() != ".." &&
+               offer.file.native().find('\0') == std::string::npos,
            [&] { return "a plugin outside its folder: " + offer.file.string(); });
     if (asked++ < kMostAsked) expect_refused(plugins, offer);
   }

@@ -453,6 +453,7 @@ TEST_F(PluginBoundary, ABrokenSidecarHurtsNobodyElse) {
   write("odd_offer.json", whole + R"("file": "x.so", "offers": [{"kind": "loss", "name": 7}]})");
   write("outside.json", whole + R"("file": "../x.so", "offers": []})");
   write("parent.json", whole + R"("file": "..", "offers": []})");
+  write("zero.json", whole + R"("file": "x\u0000.so", "offers": []})");
   copy("nothing_wrong", "plain");
   cairn::Registry registry(search_in({folder()}));
   EXPECT_NE(registry.make<cairn::Loss>("plain"), nullptr);
@@ -469,7 +470,8 @@ TEST_F(PluginBoundary, ABrokenSidecarHurtsNobodyElse) {
                   about("not_json.json", "is not JSON"),
                   about("odd_offer.json", "has no text 'name'"),
                   about("outside.json", "names no file of its own folder"),
-                  about("parent.json", "names no file of its own folder")));
+                  about("parent.json", "names no file of its own folder"),
+                  about("zero.json", "names no file of its own folder")));
 }
 
 TEST_F(PluginBoundary, ASidecarOfAnotherBuildIsNoticed) {
