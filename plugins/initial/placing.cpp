@@ -28,28 +28,28 @@ Placing::Placing(Graph& graph)
       factors_(graph),
       placed_(static_cast<std::size_t>(graph.variable_count()), false) {}
 
-Placing::Ends Placing::ends(int variable, int factor) const {
-  Ends found;
-  const auto variables = graph_.factor_variables(factor);
-  for (std::size_t k = 0; k < variables.size(); ++k) {
-    if (variables[k] == variable) {
-      found.target = static_cast<int>(k);
-    } else if (!placed_[variables[k]]) {
-      return {};
+int Placing::find_ends(int variable, int factor) {
+  ends_.clear();
+  int target = -1;
+  for (const int v : graph_.factor_variables(factor)) {
+    if (v == variable) {
+      target = static_cast<int>(std::ssize(ends_));
+    } else if (!placed_[v]) {
+      return -1;
     }
-    found.states.push_back(graph_.state(variables[k]).data());
+    ends_.push_back(graph_.state(v).data());
   }
-  return found;
+  return target;
 }
 
 bool Placing::place(int variable, int factor) {
-  const Ends found = ends(variable, factor);
-  if (found.target < 0) return false;
-  std::vector<double> out(static_cast<std::size_t>(graph_.type(variable).ambient_size()));
-  if (!place_wholly(graph_.factor_type(factor), graph_.sqrt_information(factor), found.target,
-                    found.states.data(), graph_.measurement(factor).data(), out.data()))
+  const int target = find_ends(variable, factor);
+  if (target < 0) return false;
+  place_.assign(static_cast<std::size_t>(graph_.type(variable).ambient_size()), 0.0);
+  if (!place_wholly(graph_.factor_type(factor), graph_.sqrt_information(factor), target,
+                    ends_.data(), graph_.measurement(factor).data(), place_.data()))
     return false;
-  graph_.set_state(variable, out);
+  graph_.set_state(variable, place_);
   placed_[variable] = true;
   return true;
 }
@@ -57,17 +57,17 @@ bool Placing::place(int variable, int factor) {
 bool Placing::place_in_part(int variable, int factor) {
   if (graph_.information_rank(factor) == graph_.factor_type(factor).residual_size())
     return false;  // all of it is measured: it was tried
-  const Ends found = ends(variable, factor);
-  if (found.target < 0 || found.states.size() < 2) return false;
+  const int target = find_ends(variable, factor);
+  if (target < 0 || ends_.size() < 2) return false;
   const FactorType& type = graph_.factor_type(factor);
   const double* const z = graph_.measurement(factor).data();
   std::vector<double> state(graph_.state(variable).begin(), graph_.state(variable).end());
   std::vector<double> unused(state.size());
-  if (!type.propagate(found.target, found.states.data(), z, unused.data())) return false;
-  if (const double* const beside = neighbour(type, found.target, found.states))
+  if (!type.propagate(target, ends_.data(), z, unused.data())) return false;
+  if (const double* const beside = neighbour(type, target, ends_))
     state.assign(beside, beside + state.size());
-  if (!cairn::place_in_part(type, graph_.type(variable), graph_.sqrt_information(factor),
-                            found.target, found.states, z, state))
+  if (!cairn::place_in_part(type, graph_.type(variable), graph_.sqrt_information(factor), target,
+                            ends_, z, state))
     return false;
   graph_.set_state(variable, state);
   placed_[variable] = true;

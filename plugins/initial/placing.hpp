@@ -59,12 +59,9 @@ class Placing {
   void finish(std::vector<std::string>& notes);
 
  private:
-  /// The states of a factor's variables, in its order.
-  struct Ends {
-    int target = -1;  // which of them is to be placed; -1 if another is not placed
-    std::vector<const double*> states;
-  };
-  Ends ends(int variable, int factor) const;
+  /// Makes `ends_` the states of a factor's variables, in its order. Returns which of them is
+  /// `variable`; -1 if another is not placed.
+  int find_ends(int variable, int factor);
   bool place_in_part(int variable, int factor);
   void place_the_rest(std::vector<std::string>& notes);
   /// From `start` by measurements in part, and by all that determine a place from there. Returns
@@ -75,6 +72,9 @@ class Placing {
   Graph& graph_;
   FactorsOfVariables factors_;
   std::vector<bool> placed_;
+  // Kept from call to call, since there is one for each factor:
+  std::vector<const double*> ends_;
+  std::vector<double> place_;
 };
 
 /// "1 pose" or "3 poses".
