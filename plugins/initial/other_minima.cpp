@@ -21,10 +21,11 @@ namespace {
 constexpr double kLower = 1e-4;            // a smaller fraction of chi2 is no lower minimum
 constexpr double kElsewhere = 1e-3;        // nor is this another one
 constexpr double kIterations = 500'000.0;  // of one variable
-constexpr int kInVain = 32;                // random starts in vain end the search
-constexpr int kMostTries = 1000;           // random starts
-constexpr double kNearly = 0.05;           // of chi2: minima that are nearly as low
-constexpr double kRejected = 0.01;         // of its weight without a loss
+// Random starts in vain end the search; more where they cost little.
+constexpr int kInVain = 32, kInVainOfFew = 64;
+constexpr int kMostTries = 1000;    // random starts
+constexpr double kNearly = 0.05;    // of chi2: minima that are nearly as low
+constexpr double kRejected = 0.01;  // of its weight without a loss
 constexpr Stop kOnTheWay{.max_iterations = 30, .tolerance = 1e-4};
 constexpr Stop kToAMinimum{.max_iterations = 60, .tolerance = 1e-6};
 
@@ -57,6 +58,7 @@ class Search {
         losses_(graph),
         gauge_(resolve_gauge(graph)),
         to_the_end_(few_that_disagree(graph, largest_turn(graph))),
+        in_vain_(to_the_end_ ? kInVainOfFew : kInVain),
         optimizers_(optimizers),
         optimizer_(optimizers.one),
         given_(graph.values()),
@@ -111,7 +113,7 @@ class Search {
     for (const int axis : {1, 2}) {
       for (const double turns : {1.0, -1.0}) try_turned(turns, axis);
     }
-    for (int k = 0; found_.starts - last_ < kInVain && k < kMostTries; ++k) {
+    for (int k = 0; found_.starts - last_ < in_vain_ && k < kMostTries; ++k) {
       use_other(k / 4 % 2 == 1);
       try_at_random(k);
     }
@@ -303,6 +305,7 @@ class Search {
   KeptLosses losses_;
   Gauge gauge_;
   bool to_the_end_;
+  int in_vain_;
   SearchOptimizers optimizers_;
   Optimizer* optimizer_;  ///< by which the next start is optimised
   std::function<bool()> wanted_;
