@@ -186,6 +186,11 @@ json::object report_json(const CompactOptions& options, const CompactOutcome& ou
   report["thresholds"] = thresholds_json(outcome.thresholds, outcome.found);
   for (auto& [name, value] : result_json(outcome.shown(), outcome.data)) report[name] = value;
   if (outcome.control) report["like"] = result_json(outcome.result, outcome.data);
+  if (outcome.check) {
+    report["check"] = {{"distance", outcome.check->distance}, {"extent", outcome.check->extent}};
+  } else {
+    report["check"] = nullptr;
+  }
   report["recovery"] = options.recovery;
   report["map"] = text_json(options.map);
   report["located"] = outcome.result.located;
@@ -252,6 +257,7 @@ std::string summary_text(const CompactOptions& options, const CompactOutcome& ou
   if (const std::string line = thresholds_line(outcome.thresholds); !line.empty())
     table.add({"thresholds", line});
   add_result(table, outcome.shown(), outcome.data, outcome.found);
+  if (outcome.check) table.add({"check", outcome.check->to_string()});
   if (outcome.result.interrupted) {
     table.add({"status", "interrupted"});
   } else if (!outcome.shown().located) {

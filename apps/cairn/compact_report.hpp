@@ -7,6 +7,7 @@
 
 #include <boost/json/fwd.hpp>
 
+#include "cairn/policy/map_check.hpp"
 #include "cairn/policy/policy_run.hpp"
 #include "cairn/policy/threshold_search.hpp"
 #include "cairn/policy/uncertainty_comparison.hpp"
@@ -25,6 +26,7 @@ struct CompactOutcome {
   const UsedThresholds& thresholds;  ///< of the run, whatever was found
   PolicyResult result;
   std::optional<PolicyResult> control;  ///< as many poses and loops at random
+  std::optional<MapCheck> check = {};   ///< of what is shown
 
   /// What is written and shown.
   const PolicyResult& shown() const { return control ? *control : result; }

@@ -184,6 +184,22 @@ def test_ctrl_c_ends_it_with_what_was_kept():
     assert (ended.returncode, ended.stdout) == (0, "went on\n"), ended.stderr
 
 
+def test_it_says_how_far_it_is_from_the_map_of_all_measurements():
+    graph, _ = city()
+    few = cairn.compact(graph, range=8, angle=3.15, loop_gain=1e6, pose_gain=0)
+    everything = graph.copy()
+    cairn.optimize(everything)
+    estimate = np.array(few.trajectory.states(Pose2))[:, :2]
+    whole = np.array(everything.states(Pose2))[:, :2]
+    p, q = estimate - estimate.mean(0), whole - whole.mean(0)
+    u, _, v = np.linalg.svd(p.T @ q)
+    turn = v.T @ np.diag([1, np.linalg.det(v.T @ u.T)]) @ u.T
+    assert_allclose(few.distance, np.sqrt(np.mean(np.sum((p @ turn.T - q) ** 2, 1))), rtol=1e-5)
+    assert few.distance > 0.05
+    assert cairn.compact(graph, strategy="apal", range=100, angle=3.15).distance < 1e-5
+    assert cairn.compact(graph, registration="recorded:false_rate=0.1", range=8, angle=3.15).distance is None
+
+
 # Live --------------------------------------------------------------------------------------------
 
 

@@ -21,6 +21,7 @@
 #include "bound_graph.hpp"
 #include "cairn/evaluation/plausibility.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "cairn/policy/map_check.hpp"
 #include "cairn/policy/policy_run.hpp"
 #include "cairn/policy/selection_check.hpp"
 #include "cairn/policy/threshold_search.hpp"
@@ -40,6 +41,7 @@ struct BoundResult {
   FoundThresholds found;
   PolicyData data;  ///< counts of the recording; its graphs are moved away
   std::unique_ptr<BoundGraph> compact, trajectory;
+  std::optional<MapCheck> check;
   std::vector<std::string> notes;
 
   std::string status() const {
@@ -96,6 +98,13 @@ void run(Plan& plan, const PolicySetting& setting, Follower& follower, BoundResu
   if (plan.map) policy.load(*plan.map);
   policy.run(setting.data.poses.size(), plan.job.policy.name);
   out.result = policy.finish(plan.recovery);
+  if (!plan.own && plan.job.registration == "recorded") out.check = check_map(out.result, setting);
+  if (out.check && out.check->is_far()) {
+    out.notes.push_back(fmt::format(
+        "the map is {}: a lower loop_gain uses more loop closures; cairn.sparsify keeps few poses, "
+        "and the estimate of all measurements",
+        out.check->to_string()));
+  }
   SelectionCheck check;
   for (const PoseReport& pose : out.result.poses) check.add(pose);
   const FoundThresholds* found = out.found.seconds > 0.0 ? &out.found : nullptr;
@@ -244,6 +253,14 @@ void bind_result(py::module_& module) {
                              "With the truth of all poses: (e^T Sigma^-1 e, degrees of freedom), "
                              "the mean of the first being the second where the covariance is "
                              "right; else None.")
+      .def_property_readonly(
+          "distance",
+          [](const BoundResult& bound) {
+            return bound.check ? std::optional(bound.check->distance) : std::nullopt;
+          },
+          "How far all poses are from the map of all measurements, after alignment, root mean "
+          "square [m]; None where that map is no measure of it: another map was continued, matches "
+          "were inconsistent, or they were not those of the graph.")
       .def_property_readonly(
           "thresholds", [](const BoundResult& bound) { return bound.found.options; },
           "Options of the policy that were found, as texts.")

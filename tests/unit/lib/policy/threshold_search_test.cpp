@@ -235,7 +235,7 @@ TEST_F(FindThresholds, TheToleranceDoesNotDependOnTheScaleOfTheInformation) {
   const FoundThresholds coarse = find("compact_pose", 2.5);
   EXPECT_NEAR(coarse.noise_scale, 0.1 * right.noise_scale, 0.02);
   EXPECT_NEAR(coarse.tolerance, right.tolerance, 0.2 * right.tolerance);
-  // Not the same ones: whether a pose is probably within range does depend on the covariance.
+  // Nearly the same ones: the distance test goes by deviations as they are in both.
   EXPECT_NEAR(coarse.trials.back().poses_kept, right.trials.back().poses_kept, 10);
 }
 

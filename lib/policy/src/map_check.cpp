@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/policy/map_check.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include <fmt/core.h>
+
+#include "cairn/evaluation/optimization.hpp"
+#include "cairn/evaluation/plausibility.hpp"
+#include "cairn/evaluation/trajectory.hpp"
+#include "cairn/graph/gauge.hpp"
+
+namespace cairn {
+namespace {
+
+constexpr const char* kOptimizer = "levenberg_marquardt";
+constexpr const char* kGuess = "auto";
+
+/// The recording with the poses of the run, and its landmarks where it has them.
+Graph recording_at(const PolicyResult& result, const PolicySetting& setting) {
+  Graph whole = setting.data.recording.clone();
+  whole.set_loss(setting.loss, setting.loss_on);
+  for (const Graph* from : {&result.compact, &result.trajectory}) {
+    for (int v = 0; v < from->variable_count(); ++v) {
+      if (const auto there = whole.find(from->id(v)); there && !whole.fixed(*there))
+        whole.set_state(*there, from->state(v));
+    }
+  }
+  return whole;
+}
+
+double extent_of(const Trajectory& poses) {
+  double squares = 0.0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto [low, high] =
+        std::ranges::minmax(poses, {}, [axis](const TrajectoryPose& pose) { return pose.t[axis]; });
+    squares += (high.t[axis] - low.t[axis]) * (high.t[axis] - low.t[axis]);
+  }
+  return std::sqrt(squares);
+}
+
+}  // namespace
+
+std::string MapCheck::to_string() const {
+  return fmt::format("{:.3g} m from the map of all measurements, {:.2g} % of its extent", distance,
+                     extent > 0.0 ? 100.0 * distance / extent : 0.0);
+}
+
+std::optional<MapCheck> check_map(const PolicyResult& result, const PolicySetting& setting) {
+  if (result.interrupted || result.map_poses > 0 || result.poses.size() < 2) return std::nullopt;
+  if (result.verdicts.contains("inconsistent")) return std::nullopt;
+  Graph whole = recording_at(result, setting);
+  const auto optimizer = setting.registry.make<Optimizer>(kOptimizer);
+  const auto guess = setting.registry.make<InitialGuess>(kGuess);
+  const Stop stop{.interrupt = setting.interrupt};
+  Observer observer;
+  const Summary summary =
+      optimize(whole, {*optimizer, kOptimizer, guess.get(), kGuess}, stop, observer);
+  const std::int64_t dof = degrees_of_freedom(whole, resolve_gauge(whole));
+  if (summary.status != Status::converged || !is_plausible(summary.final_chi2, dof))
+    return std::nullopt;
+  const Trajectory everything = trajectory(whole);
+  return MapCheck{absolute_error(trajectory(result.trajectory), everything), extent_of(everything)};
+}
+
+}  // namespace cairn
