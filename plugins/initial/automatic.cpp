@@ -91,6 +91,8 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
     const std::vector<NamedStart> starts = {
         {"as_given", [&](Graph& of) { of.set_values(given_); }},
         {"spanning_tree", [&](Graph& of) { make_spanning_tree({})->compute(of); }},
+        {"spanning_tree by information",
+         [&](Graph& of) { make_spanning_tree({.weight = TreeWeight::information})->compute(of); }},
         {"its own start", [&](Graph& of) { of.set_values(chosen_); }},
         {"incremental", [&](Graph& of) { small_steps(of); }, 75}};
     const OtherMinima found =
@@ -234,8 +236,9 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
     if (chance < kChance)
       return fmt::format("since chi2 is {:.3g} times the {} degrees of freedom", ratio, dof);
     const double angle = largest_turn(graph);
+    const bool few = few_that_disagree(graph, angle);
     // Where chi2 says that information is of another scale, it says nothing of measurements.
-    if (few_that_disagree(graph, angle) && std::min(chance, 1.0 - chance) < kUnusual) {
+    if (few && std::min(chance, 1.0 - chance) < kUnusual) {
       return fmt::format(
           "since poses disagree with a measurement by {:.2g} rad, and chi2 is {:.3g} times the {} "
           "degrees of freedom",
@@ -243,6 +246,12 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
     }
     if (fall > kLargeFall && angle > kSmallAngle)
       return fmt::format("since chi2 fell {:.3g} times from the start", fall);
+    // Where loop closures are few, chi2 is plausible in many minima.
+    if (few && static_cast<double>(dof) < kFewLoops * graph.variable_count()) {
+      return fmt::format(
+          "since poses disagree with a measurement by {:.2g} rad, and loop closures are few",
+          angle);
+    }
     if (!(angle > kLargeAngle)) return {};
     return fmt::format("since poses disagree with a measurement by {:.2g} rad", angle);
   }
@@ -320,6 +329,7 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
   static constexpr double kSmallAngle = 0.1, kLargeAngle = 0.9;  // [rad]
   static constexpr double kToNothing = 1e10;
   static constexpr double kChance = 1e-4, kUnusual = 1e-2;  // of χ²
+  static constexpr double kFewLoops = 3.0;                  // degrees of freedom per variable
   static constexpr double kContradiction = 5.0;             // chi2 per degree of freedom
 
   Stop stop_;

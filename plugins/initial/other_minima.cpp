@@ -58,7 +58,7 @@ class Search {
         losses_(graph),
         gauge_(resolve_gauge(graph)),
         to_the_end_(few_that_disagree(graph, largest_turn(graph))),
-        in_vain_(to_the_end_ ? kInVainOfFew : kInVain),
+        in_vain_(graph.variable_count() <= kFewVariables ? kInVainOfFew : kInVain),
         optimizers_(optimizers),
         optimizer_(optimizers.one),
         given_(graph.values()),
