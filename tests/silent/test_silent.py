@@ -34,6 +34,13 @@ def test_ordinary_graphs_have_no_finding():
     assert [search.shown(v) for v in verdicts if v.finding] == []
 
 
+@pytest.mark.parametrize("seed", [1000112, 1000188, 1000450, 1000505, 1000570])
+def test_rounding_is_no_other_minimum(seed):
+    """What fits exactly does so everywhere within its uncertainty, but for rounding."""
+    verdict = judge("priors", seed, draw("priors", seed))
+    assert verdict.chi2 < 1e-20 and verdict.doubts == []
+
+
 def test_a_bad_start_is_found():
     """From the states that are given, random ones among them, some graphs end elsewhere in silence."""
     verdicts = (judge("rotation", seed, draw("rotation", seed), initial=None) for seed in range(1, 60))

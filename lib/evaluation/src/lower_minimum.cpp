@@ -27,19 +27,22 @@ constexpr int kDirections = 3;
 constexpr double kGauge = 1e-12;    // of the eigenvalues of H, scaled to unit diagonal
 constexpr double kLower = 1e-6;     // of chi2
 constexpr double kSettled = 1e-12;  // of chi2, in one step
+constexpr double kExact = 1e-12;    // chi2 per measured number: what is left is rounding
 
 std::span<const double> numbers(const VectorXd& v) {
   return {v.data(), static_cast<std::size_t>(v.size())};
 }
 
-/// Whether cameras and points are few, with less than twice as many measurements as unknowns.
-bool is_poor(const Graph& graph, const Gauge& gauge) {
+/// Whether cameras and points are few, with less than twice as many measurements as unknowns, which
+/// do not fit exactly.
+bool is_poor(const Graph& graph, const Gauge& gauge, double chi2) {
   std::int64_t unknowns = 0, measured = 0;
   for (int v = 0; v < graph.variable_count(); ++v) {
     if (!gauge.held[v]) unknowns += graph.type(v).tangent_size();
   }
   for (int f = 0; f < graph.factor_count(); ++f) measured += graph.information_rank(f);
-  return unknowns > 0 && unknowns <= kMostUnknowns && measured < 2 * unknowns;
+  return unknowns > 0 && unknowns <= kMostUnknowns && measured < 2 * unknowns &&
+         chi2 > kExact * static_cast<double>(measured);
 }
 
 /// The same normal equations as those of a large graph, as dense matrices.
@@ -127,7 +130,7 @@ class DenseDescent {
 std::string lower_minimum_nearby(const Graph& graph, double chi2) {
   if (graph.variable_count() > kMostUnknowns || !std::isfinite(chi2)) return {};
   const Gauge gauge = resolve_gauge(graph);
-  if (gauge.left_free.empty() || !is_poor(graph, gauge)) return {};
+  if (gauge.left_free.empty() || !is_poor(graph, gauge, chi2)) return {};
   DenseDescent descent(graph, gauge);
   descent.linearize(graph.values());
   const MatrixXd steps = descent.worst_determined();

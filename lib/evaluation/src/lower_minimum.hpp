@@ -13,7 +13,7 @@ namespace cairn {
 /// and three standard deviations to either side along the three directions that are determined
 /// worst. Empty where there is none, and where there are more than 100 unknowns, at least twice as
 /// many measurements, or no component whose gauge is left free: then it costs a count of the
-/// variables.
+/// variables; and where all measurements fit exactly.
 std::string lower_minimum_nearby(const Graph& graph, double chi2);
 
 }  // namespace cairn
