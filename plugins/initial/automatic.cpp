@@ -80,7 +80,7 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
       notes = choose(graph);
     }
     if (!wanted_) notes.push_back("interrupted: not all starts were tried");
-    chosen_ = graph.values();
+    if (graph.variable_count() <= kMostVariables) chosen_ = graph.values();
     return notes;
   }
 
@@ -88,6 +88,7 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
     wanted_ = true;
     const std::string reason = reason_to_look_again(graph, summary);
     if (reason.empty()) return {};
+    if (!other_ && candidates_.make_other) other_ = candidates_.make_other();
     const std::vector<NamedStart> starts = {
         {"as_given", [&](Graph& of) { of.set_values(given_); }},
         {"spanning_tree", [&](Graph& of) { make_spanning_tree({})->compute(of); }},
@@ -96,7 +97,7 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
         {"its own start", [&](Graph& of) { of.set_values(chosen_); }},
         {"incremental", [&](Graph& of) { small_steps(of); }, 75}};
     const OtherMinima found =
-        search_other_minima(graph, starts, {candidates_.optimizer.get(), candidates_.other.get()},
+        search_other_minima(graph, starts, {candidates_.optimizer.get(), other_.get()},
                             [&](double part) { return wanted("other starts", part); });
     return {.lower = !found.found_by.empty(),
             .notes = in_words(found, reason),
@@ -329,11 +330,12 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
   static constexpr double kSmallAngle = 0.1, kLargeAngle = 0.9;  // [rad]
   static constexpr double kToNothing = 1e10;
   static constexpr double kChance = 1e-4, kUnusual = 1e-2;  // of χ²
-  static constexpr double kFewLoops = 3.0;                  // degrees of freedom per variable
+  static constexpr double kFewLoops = 2.0;                  // degrees of freedom per variable
   static constexpr double kContradiction = 5.0;             // chi2 per degree of freedom
 
   Stop stop_;
   Candidates candidates_;
+  std::unique_ptr<Optimizer> other_;  ///< once a search has needed it
   Values given_, chosen_;
   std::string rejected_;  // starts, with the numbers that decided
   GoOn go_on_;

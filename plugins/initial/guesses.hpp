@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -101,7 +102,9 @@ struct AutomaticOptions {
 struct Candidates {
   std::unique_ptr<InitialGuess> chordal;
   std::unique_ptr<Optimizer> optimizer;  ///< for trials
-  std::unique_ptr<Optimizer> other;      ///< of another kind, which ends in other minima
+  /// Makes one of another kind, which ends in other minima; null: there is none. Only a search
+  /// needs it, and few graphs are searched.
+  std::function<std::unique_ptr<Optimizer>()> make_other;
   std::unique_ptr<InitialGuess> incremental;
   std::unique_ptr<InitialGuess> small_steps;  ///< incremental, with 50 optimisations
 };

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <memory>
+#include <string>
+
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "guesses.hpp"
@@ -29,10 +32,10 @@ Candidates candidates(const AutomaticOptions& options, Registry& registry) {
     return make_chordal({}, registry.make<LinearSolver>(options.linear_solver));
   });
   result.optimizer = made_if_there(same_optimizer, optimizer);
-  result.other = made_if_there(true, [&] {
-    return registry.make<Optimizer>(options.optimizer.starts_with("dogleg") ? defaults.optimizer
-                                                                            : "dogleg");
-  });
+  const std::string other = options.optimizer.starts_with("dogleg") ? defaults.optimizer : "dogleg";
+  result.make_other = [other, &registry] {
+    return made_if_there(true, [&] { return registry.make<Optimizer>(other); });
+  };
   result.incremental =
       made_if_there(same_optimizer, [&] { return make_incremental({.step = 0}, optimizer()); });
   result.small_steps =
