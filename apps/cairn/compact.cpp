@@ -321,12 +321,6 @@ void note_selection(const CompactOptions& options, const CompactOutcome& outcome
   }
 }
 
-/// Whether what matches is what was recorded, so that the recording is what the map stands for.
-bool matches_as_recorded(const CompactOptions& options) {
-  const ComponentSpec registration = parse_component(options.registration);
-  return registration.name == "recorded" && !registration.values.contains("false_rate");
-}
-
 /// A map that is far from that of all measurements has lost more than its covariances say.
 void note_distance(const CompactOptions& options, const CompactOutcome& outcome,
                    const Session& session) {
@@ -337,8 +331,7 @@ void note_distance(const CompactOptions& options, const CompactOutcome& outcome,
   session.note(fmt::format(
       "the map is {}: a lower --loop-gain uses more loop closures, --strategy apal all of them; "
       "cairn sparsify {} --select smallest_blanket:part={:.2g} keeps as few poses, and the "
-      "estimate of all "
-      "measurements",
+      "estimate of all measurements",
       outcome.check->to_string(), options.graph, part));
 }
 
@@ -400,7 +393,7 @@ int run_compact(const CompactOptions& options, Session& session) {
     outcome.control = run_job(random, nullptr);
   }
   const PolicyResult& shown = outcome.shown();
-  if (matches_as_recorded(options)) outcome.check = check_map(shown, setting);
+  outcome.check = check_map(job.job, shown, setting);
   results.write(options.output, [&] {
     write_graph(shown.compact, options.output, registry,
                 output_format(options.output, options.output_format));

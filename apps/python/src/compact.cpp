@@ -98,7 +98,7 @@ void run(Plan& plan, const PolicySetting& setting, Follower& follower, BoundResu
   if (plan.map) policy.load(*plan.map);
   policy.run(setting.data.poses.size(), plan.job.policy.name);
   out.result = policy.finish(plan.recovery);
-  if (!plan.own && plan.job.registration == "recorded") out.check = check_map(out.result, setting);
+  out.check = check_map(plan.job, out.result, setting);
   if (out.check && out.check->is_far()) {
     out.notes.push_back(fmt::format(
         "the map is {}: a lower loop_gain uses more loop closures; cairn.sparsify keeps few poses, "

@@ -14,7 +14,7 @@ namespace cairn::python {
 namespace py = pybind11;
 
 /// A factor type whose residual is a function written in Python, called with arrays. What it raises
-/// is an `Error` (plugin); what is no Exception of Python, as after Ctrl-C, is an `CallbackExit`,
+/// is an `Error` (plugin); what is no Exception of Python, as after Ctrl-C, is a `CallbackExit`,
 /// so that the caller gets it as it is. An optimisation obeys Ctrl-C otherwise (`InterruptGuard`),
 /// and keeps its best estimate.
 class PythonFactor final : public BatchedFactorType {

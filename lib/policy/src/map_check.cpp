@@ -32,6 +32,12 @@ Graph recording_at(const PolicyResult& result, const PolicySetting& setting) {
   return whole;
 }
 
+bool matches_as_recorded(const PolicyJob& job) {
+  if (job.own) return false;
+  const ComponentSpec registration = parse_component(job.registration);
+  return registration.name == "recorded" && !registration.values.contains("false_rate");
+}
+
 double extent_of(const Trajectory& poses) {
   double squares = 0.0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -49,7 +55,9 @@ std::string MapCheck::to_string() const {
                      extent > 0.0 ? 100.0 * distance / extent : 0.0);
 }
 
-std::optional<MapCheck> check_map(const PolicyResult& result, const PolicySetting& setting) {
+std::optional<MapCheck> check_map(const PolicyJob& job, const PolicyResult& result,
+                                  const PolicySetting& setting) {
+  if (!matches_as_recorded(job)) return std::nullopt;
   if (result.interrupted || result.map_poses > 0 || result.poses.size() < 2) return std::nullopt;
   if (result.verdicts.contains("inconsistent")) return std::nullopt;
   Graph whole = recording_at(result, setting);

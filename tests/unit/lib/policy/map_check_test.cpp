@@ -27,13 +27,15 @@ class MapCheckOf : public ::testing::Test {
     return run.finish(Recovery::distribute);
   }
 
+  PolicyJob job_{.policy = {}};  // what it is checked by: its registration
   Registry registry_;
   PolicyData data_;
   PolicySetting setting_{.data = data_, .registry = registry_};
 };
 
 TEST_F(MapCheckOf, EverythingIsNowhereFar) {
-  const auto check = check_map(run("compact_pose:strategy=apal,range=100,angle=3.15"), setting_);
+  const auto check =
+      check_map(job_, run("compact_pose:strategy=apal,range=100,angle=3.15"), setting_);
   ASSERT_TRUE(check);
   EXPECT_LT(check->distance, 1e-6);
   EXPECT_FALSE(check->is_far());
@@ -43,7 +45,7 @@ TEST_F(MapCheckOf, EverythingIsNowhereFar) {
 TEST_F(MapCheckOf, OdometryAloneIsItsDistance) {
   const PolicyResult alone = run("compact_pose:loop_gain=1e6,pose_gain=0");
   ASSERT_EQ(alone.kept_loops, 0);
-  const auto check = check_map(alone, setting_);
+  const auto check = check_map(job_, alone, setting_);
   ASSERT_TRUE(check);
   const PolicyResult all = run("compact_pose:strategy=apal,range=100,angle=3.15");
   EXPECT_NEAR(check->distance,
@@ -59,17 +61,19 @@ TEST_F(MapCheckOf, MeasurementsThatContradictEachOtherTellNothing) {
   Simulation world =
       registry_.make<Generator>("manhattan:poses=200,outliers=10")->generate(registry_, 3);
   data_ = policy_data(std::move(world.graph));
-  EXPECT_FALSE(
-      check_map(run("compact_pose:range=100,angle=3.15,loop_gain=1e6,pose_gain=0"), setting_));
+  EXPECT_FALSE(check_map(job_, run("compact_pose:range=100,angle=3.15,loop_gain=1e6,pose_gain=0"),
+                         setting_));
   const PolicyResult gated = run("compact_pose:range=100,angle=3.15,gate=0.99");
   ASSERT_TRUE(gated.verdicts.contains("inconsistent"));
-  EXPECT_FALSE(check_map(gated, setting_));
+  EXPECT_FALSE(check_map(job_, gated, setting_));
 }
 
-TEST_F(MapCheckOf, NothingIsCheckedOfAnInterruptedRun) {
+TEST_F(MapCheckOf, NothingIsCheckedOfAnInterruptedRunOrOtherMatches) {
   PolicyResult result = run("compact_pose:range=5");
+  EXPECT_TRUE(check_map({.policy = {}, .registration = "recorded:carry=0"}, result, setting_));
+  EXPECT_FALSE(check_map({.policy = {}, .registration = "simulated:range=5"}, result, setting_));
   result.interrupted = true;
-  EXPECT_FALSE(check_map(result, setting_));
+  EXPECT_FALSE(check_map(job_, result, setting_));
 }
 
 }  // namespace

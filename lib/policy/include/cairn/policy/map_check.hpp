@@ -26,8 +26,9 @@ struct MapCheck {
 /// guess `auto` makes of it, and compares. No result where that map is no measure: the run
 /// was interrupted or continued another map, matches were found to be inconsistent, which the map
 /// of all measurements is not without, or the minimum of all measurements is not plausible or not
-/// found. What matched must be what was recorded.
-CAIRN_API std::optional<MapCheck> check_map(const PolicyResult& result,
+/// found. Nor where `job` has another registration than `recorded`, or one with false matches: what
+/// matched is not what was recorded then.
+CAIRN_API std::optional<MapCheck> check_map(const PolicyJob& job, const PolicyResult& result,
                                             const PolicySetting& setting);
 
 }  // namespace cairn
