@@ -23,9 +23,10 @@ constexpr double kElsewhere = 1e-3;        // nor is this another one
 constexpr double kIterations = 500'000.0;  // of one variable
 // Random starts in vain end the search; more where they cost little.
 constexpr int kInVain = 32, kInVainOfFew = 64;
-constexpr int kMostTries = 1000;    // random starts
-constexpr double kNearly = 0.05;    // of chi2: minima that are nearly as low
-constexpr double kRejected = 0.01;  // of its weight without a loss
+constexpr int kMostTries = 1000;  // random starts
+constexpr double kNearly = 0.05;  // of chi2: minima that are nearly as low
+// Of its weight without a loss: a factor that is rejected, and one that others nearly outvoted.
+constexpr double kRejected = 0.01, kOutvoted = 0.25;
 constexpr Stop kOnTheWay{.max_iterations = 30, .tolerance = 1e-4};
 constexpr Stop kToAMinimum{.max_iterations = 60, .tolerance = 1e-6};
 
@@ -57,7 +58,8 @@ class Search {
       : graph_(graph),
         losses_(graph),
         gauge_(resolve_gauge(graph)),
-        to_the_end_(few_that_disagree(graph, largest_turn(graph))),
+        to_the_end_(few_that_disagree(graph, largest_turn(graph)) ||
+                    (graph.variable_count() <= kFewVariables && !below(kOutvoted).empty())),
         in_vain_(graph.variable_count() <= kFewVariables ? kInVainOfFew : kInVain),
         optimizers_(optimizers),
         optimizer_(optimizers.one),
@@ -129,15 +131,20 @@ class Search {
 
   /// The factors that losses have all but taken from the best minimum so far.
   std::vector<int> rejected() {
+    graph_.set_values(best_);
+    return below(kRejected);
+  }
+
+  /// The factors to which losses leave less than a fraction of their weight.
+  std::vector<int> below(double fraction) const {
     std::vector<int> result;
     if (!graph_.has_losses()) return result;
-    graph_.set_values(best_);
     const std::vector<double> norms = squared_norms(graph_);
     for (int f = 0; f < graph_.factor_count(); ++f) {
       double weight = 1.0;
       if (const Loss* loss = graph_.loss(f))
         loss->evaluate({&norms[static_cast<std::size_t>(f)], 1}, {}, {&weight, 1});
-      if (weight < kRejected) result.push_back(f);
+      if (weight < fraction) result.push_back(f);
     }
     return result;
   }

@@ -62,8 +62,9 @@ struct OtherMinima {
 ///
 /// and by the other optimizer, if there is one, each of the starts that cost nothing and every
 /// second four at random.
-/// It ends where the first of these all lead back and losses reject nothing (not where few poses
-/// disagree with a measurement, `kTurnOfFew`), and where 32 starts at random, 64 in a small graph,
+/// It ends where the first of these all lead back and losses reject nothing (not in a small graph
+/// whose poses disagree with a measurement, `kTurnOfFew`, or whose losses leave a factor less than
+/// a quarter of its weight), and where 32 starts at random, 64 in a small graph,
 /// lead to nothing lower. A start under bounded losses is optimised by losses that are tightened to
 /// them. `wanted`: whether to go on, asked between the starts and in each iteration. The time is
 /// bounded by a number of iterations that falls with the size of the graph; none are left for more

@@ -41,6 +41,12 @@ def test_rounding_is_no_other_minimum(seed):
     assert verdict.chi2 < 1e-20 and verdict.doubts == []
 
 
+def test_a_bounded_loss_that_outvotes_measurements_is_searched():
+    """No factor is rejected here, but four have less than a quarter of their weight, and another minimum is lower."""
+    verdict = judge("robust_clean", 1000709, draw("robust_clean", 1000709))
+    assert verdict.finding == "", search.shown(verdict)
+
+
 def test_a_bad_start_is_found():
     """From the states that are given, random ones among them, some graphs end elsewhere in silence."""
     verdicts = (judge("rotation", seed, draw("rotation", seed), initial=None) for seed in range(1, 60))
