@@ -47,6 +47,12 @@ def test_a_bounded_loss_that_outvotes_measurements_is_searched():
     assert verdict.finding == "", search.shown(verdict)
 
 
+def test_a_landmark_where_a_pose_is_has_no_bearing():
+    """A noisy short range pulls the landmark onto the pose, where the bearing jumps: no optimizer finds the way from there."""
+    verdict = judge("ordinary", 5000401, draw("ordinary", 5000401))
+    assert any("the landmark is where the pose is" in doubt for doubt in verdict.doubts) and verdict.finding == "", search.shown(verdict)
+
+
 def test_a_bad_start_is_found():
     """From the states that are given, random ones among them, some graphs end elsewhere in silence."""
     verdicts = (judge("rotation", seed, draw("rotation", seed), initial=None) for seed in range(1, 60))

@@ -2,10 +2,11 @@
 #pragma once
 
 #include <cmath>
+#include <string>
 
 #include "cairn/lie/point.hpp"
 #include "cairn/lie/se2.hpp"
-#include "cairn/types/define_factor.hpp"
+#include "cairn/types/domain.hpp"
 
 namespace cairn::slam2d {
 
@@ -45,6 +46,19 @@ struct BearingRange {
         ux * R.c - uy * R.s, ux * R.s + uy * R.c;
     return {wrap_angle<S>(so2::polar_angle<S>(py, px) - z[0]), range - z[1]};
   }
+
+  // As a `Domain`. A start far from there is no better for being so, and initial guesses have
+  // others.
+  static std::string outside(const double* const* x) {
+    return reach(x) > 0.0 ? "" : "the landmark is where the pose is, from where it has no bearing";
+  }
+  /// Two places that differ by rounding are one: a minimum of chi2 there is that of its cut alone.
+  static double reach(const double* const* x) {
+    constexpr double kOnePlace = 1e-8;
+    const double range = std::hypot(x[1][0] - x[0][0], x[1][1] - x[0][1]);
+    return range > kOnePlace * std::hypot(x[1][0], x[1][1]) ? range : -range;
+  }
+  static bool place(int, const double* const*, const double*, double, double*) { return false; }
 
   static std::string normalize(Vector<double, 2>& z) {
     if (!z.allFinite()) return "a number is not finite";

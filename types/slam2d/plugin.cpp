@@ -12,8 +12,8 @@ void cairn_register(cairn::Registrar& registrar) {
   registrar.add_types("slam2d", OptionTable{}, [](const Options&) {
     return TypeSet{{define_variable<Se2>(), define_variable<PointXY>()},
                    {define_factor<slam2d::RelativePose>(), define_factor<slam2d::Landmark>(),
-                    define_factor<slam2d::BearingRange>(), define_factor<slam2d::PosePrior>(),
-                    define_factor<slam2d::LandmarkPrior>(), define_factor<slam2d::RelativePoint>(),
-                    define_factor<slam2d::Position>()}};
+                    define_factor_with_domain<slam2d::BearingRange>(),
+                    define_factor<slam2d::PosePrior>(), define_factor<slam2d::LandmarkPrior>(),
+                    define_factor<slam2d::RelativePoint>(), define_factor<slam2d::Position>()}};
   });
 }
