@@ -23,6 +23,7 @@
 #include "cairn/policy/threshold_search.hpp"
 #include "cairn/policy/uncertainty_comparison.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/sparsification/whole_map.hpp"
 #include "commands.hpp"
 #include "compact.hpp"
 #include "compact_report.hpp"
@@ -144,12 +145,17 @@ bool names_thresholds(const CompactOptions& options, const ComponentSpec& policy
          !options.thresholds.empty() || gives_thresholds(policy);
 }
 
+constexpr std::string_view kWhole = "whole";
+
 /// What to run, and the thresholds.
 struct Job {
   PolicyJob job;
-  FoundThresholds found;  ///< or read
+  FoundThresholds found = {};  ///< or read
   UsedThresholds thresholds = {};
   std::string strategy = {};  ///< empty: the policy has none
+  std::int64_t sample = 0;    ///< poses in which the thresholds were found
+  OptionValues to_save = {};  ///< thresholds for another run
+  bool is_whole() const { return strategy == kWhole; }
 };
 
 /// So many poses from the first on: a sample without loop closures would tell nothing.
@@ -179,12 +185,32 @@ void note_short_sample(std::int64_t sample, const CompactOptions& options, const
                                  : "Find them here, without --thresholds"));
 }
 
-Job prepare(const CompactOptions& options, const PolicySetting& setting, Results& results,
-            const Session& session) {
+/// The strategy of a run: that wanted, or what the policy's own options say; empty: it has none.
+std::string strategy_of(const CompactOptions& options, const std::string& wanted,
+                        const ComponentSpec& policy, const OptionTable& table) {
+  if (!table.find("strategy")) {
+    if (!options.strategy.empty())
+      throw Error(ErrorCode::usage, fmt::format("policy '{}' has no strategies", policy.name));
+    return {};
+  }
+  const auto own = policy.values.find("strategy");
+  if (own == policy.values.end()) return wanted;
+  if (!options.strategy.empty() && own->second != options.strategy)
+    throw Error(ErrorCode::usage, "--strategy, and strategy among the policy's options: give one");
+  return own->second;
+}
+
+/// Of a whole map and of one at random the policy chooses how many poses, or which.
+std::string strategy_of_policy(const std::string& strategy) {
+  return strategy == kWhole || strategy == "rfpfl" ? "fpfl" : strategy;
+}
+
+Job prepare(const CompactOptions& options, const std::string& strategy,
+            const PolicySetting& setting, const Session& session) {
   Job result;
   PolicyJob& job = result.job;
   job.registration = options.registration;
-  if (options.strategy == "rfpfl") {
+  if (strategy == "rfpfl") {
     if (setting.data.landmarks > 0) {
       throw Error(
           ErrorCode::usage,
@@ -213,39 +239,36 @@ Job prepare(const CompactOptions& options, const PolicySetting& setting, Results
   emplace(given_thresholds(options));
   const OptionValues given = job.policy.values;
   if (!options.estimator.empty()) emplace({{"estimator", options.estimator}});
-  std::int64_t sample = 0;  // poses in which the thresholds were found
+  const OptionTable& table = setting.registry.options(PosePolicy::kKind, job.policy.name);
+  result.strategy = strategy_of(options, strategy, job.policy, table);
   if (!options.thresholds.empty()) {
     SavedThresholds saved = read_thresholds(options.thresholds, job.policy.name);
     result.found.options = std::move(saved.options);
-    sample = saved.poses;
+    result.sample = saved.poses;
   }
   if (automatic) {
     const std::size_t count = sample_size(options, setting.data, session);
-    sample = static_cast<std::int64_t>(count);
-    result.found = find_thresholds(job, count, options.error_ratio, setting);
+    result.sample = static_cast<std::int64_t>(count);
+    // The error of a whole map does not depend on which loop closures the policy uses: thresholds
+    // are lowered for another run alone.
+    if (result.is_whole() && !options.save_thresholds.empty()) {
+      const FoundThresholds others = find_thresholds(job, count, options.error_ratio, setting);
+      result.to_save = used_thresholds(given, others.options, table).options;
+    }
+    result.found =
+        find_thresholds(job, count, result.is_whole() ? 0.0 : options.error_ratio, setting);
     if (setting.interrupted()) return result;
   }
-  note_short_sample(sample, options, setting.data, session);
+  if (!result.is_whole()) note_short_sample(result.sample, options, setting.data, session);
   emplace(result.found.options);
-  const OptionTable& table = setting.registry.options(PosePolicy::kKind, job.policy.name);
   result.thresholds = used_thresholds(given, result.found.options, table);
+  if (result.to_save.empty()) result.to_save = result.thresholds.options;
+  if (!given.empty()) result.sample = 0;
   // Not while thresholds are found, for which all measurements of the sample are used.
   if (options.keep > 0 &&
       !job.policy.values.emplace("keep", fmt::format("{}", options.keep)).second)
     throw Error(ErrorCode::usage, "--keep, and keep among the policy's options: give one");
-  if (table.find("strategy")) {
-    const std::string wanted = options.strategy == "rfpfl" ? "fpfl" : options.strategy;
-    const std::string& chosen = job.policy.values.emplace("strategy", wanted).first->second;
-    if (chosen != wanted && options.strategy != CompactOptions().strategy) {
-      throw Error(ErrorCode::usage,
-                  "--strategy, and strategy among the policy's options: give one");
-    }
-    result.strategy = options.strategy == "rfpfl" ? options.strategy : chosen;
-  }
-  results.write(options.save_thresholds, [&] {
-    write_thresholds(options.save_thresholds, job.policy.name,
-                     {.options = result.thresholds.options, .poses = given.empty() ? sample : 0});
-  });
+  if (!result.strategy.empty()) emplace({{"strategy", strategy_of_policy(result.strategy)}});
   return result;
 }
 
@@ -269,7 +292,8 @@ void check(const CompactOptions& options, Session& session) {
 /// One threshold that is given leaves the others at values that know nothing of the data.
 void note_defaults(const CompactOptions& options, const CompactOutcome& outcome, Session& session) {
   if (!finds_thresholds(parse_component(options.policy), session.registry())) return;
-  const std::string defaults = replaceable_defaults(outcome.thresholds, outcome.strategy);
+  const std::string defaults =
+      replaceable_defaults(outcome.thresholds, strategy_of_policy(outcome.strategy));
   if (defaults.empty() || outcome.data.loops == 0) return;  // or a search would find none
   session.note(
       fmt::format("some thresholds are given, so no others were looked for: of {} the policy's "
@@ -302,37 +326,58 @@ std::string option_words(const OptionValues& options, const std::string& policy,
   return automatic && !words.starts_with("a ") ? "--auto " + words : words;
 }
 
+void note_advice(const SelectionCheck::Advice& advice, const CompactOptions& options,
+                 const CompactOutcome& outcome, const Session& session) {
+  const bool automatic = outcome.found.seconds > 0.0;
+  session.note(
+      fmt::format("{}; {} {}", advice.finding,
+                  option_words(advice.options, parse_component(options.policy).name, automatic),
+                  advice.effect));
+}
+
 /// A user who asked for few poses and got all of them, or no loop closure, learns why, and what
 /// would help.
 void note_selection(const CompactOptions& options, const CompactOutcome& outcome,
                     Session& session) {
   const PolicyResult& result = outcome.result;
-  if (outcome.strategy != "fpfl" || result.interrupted || !result.located) return;
+  if (strategy_of_policy(outcome.strategy) != "fpfl" || outcome.control) return;
+  if (result.interrupted || !result.located) return;
   if (!finds_thresholds(parse_component(options.policy), session.registry())) return;
   SelectionCheck check;
   for (const PoseReport& pose : result.poses) check.add(pose);
   const bool automatic = outcome.found.seconds > 0.0;
+  // A whole map has all loop closures, whichever the policy uses.
+  const std::int64_t loops = outcome.whole ? 0 : outcome.data.loops;
   for (const SelectionCheck::Advice& advice :
-       check.advice(automatic ? &outcome.found : nullptr, outcome.data.loops)) {
-    session.note(
-        fmt::format("{}; {} {}", advice.finding,
-                    option_words(advice.options, parse_component(options.policy).name, automatic),
-                    advice.effect));
-  }
+       check.advice(automatic ? &outcome.found : nullptr, loops))
+    note_advice(advice, options, outcome, session);
 }
 
 /// A map that is far from that of all measurements has lost more than its covariances say.
 void note_distance(const CompactOptions& options, const CompactOutcome& outcome,
                    const Session& session) {
-  if (!outcome.check || !outcome.check->is_far()) return;
-  const PolicyResult& shown = outcome.shown();
-  const double part =
-      1.0 - static_cast<double>(shown.kept_poses) / static_cast<double>(shown.poses.size());
-  session.note(fmt::format(
-      "the map is {}: a lower --loop-gain uses more loop closures, --strategy apal all of them; "
-      "cairn sparsify {} --select smallest_blanket:part={:.2g} keeps as few poses, and the "
-      "estimate of all measurements",
-      outcome.check->to_string(), options.graph, part));
+  if (outcome.whole) {
+    if (outcome.whole->advice) note_advice(*outcome.whole->advice, options, outcome, session);
+  } else if (outcome.check && outcome.check->is_far()) {
+    session.note(fmt::format(
+        "the map is {}: --strategy whole keeps as few poses with the estimate of all measurements, "
+        "a lower --loop-gain uses more loop closures",
+        outcome.check->to_string()));
+  }
+}
+
+/// The strategy to begin with: `whole` by default, where it can be.
+std::string first_strategy(const CompactOptions& options, const Recording& recording,
+                           const PolicySetting& setting) {
+  if (!options.strategy.empty() && options.strategy != kWhole) return options.strategy;
+  if (options.is_study) return "fpfl";
+  const std::string why_not =
+      recording.map
+          ? "the trajectory continues a map (--map)"
+          : why_no_whole_map({.policy = {}, .registration = options.registration}, setting);
+  if (why_not.empty()) return std::string(kWhole);
+  if (options.strategy.empty()) return "fpfl";
+  throw Error(ErrorCode::usage, fmt::format("--strategy {}: {}", kWhole, why_not));
 }
 
 }  // namespace
@@ -357,12 +402,6 @@ int run_compact(const CompactOptions& options, Session& session) {
         progress.show(title, count, counts);
       }};
   Results results(session);
-  const Job job = prepare(options, setting, results, session);
-  if (guard.interrupted()) {
-    progress.clear();
-    session.note("interrupted before anything was selected");
-    return kExitInterrupted;
-  }
   const Recovery recovery = parse_enum<Recovery>(options.recovery, "--recovery");
   std::optional<UncertaintyComparison> comparison;
   if (!options.compare.empty())
@@ -376,13 +415,42 @@ int run_compact(const CompactOptions& options, Session& session) {
     progress.clear();
     return run.finish(recovery);
   };
+  Job job = prepare(options, first_strategy(options, recording, setting), setting, session);
+  if (guard.interrupted()) {
+    progress.clear();
+    session.note("interrupted before anything was selected");
+    return kExitInterrupted;
+  }
+  PolicyResult result = run_job(job.job, comparison ? &*comparison : nullptr);
+  std::optional<WholeMap> whole;
+  if (job.is_whole()) {
+    NodeProgress nodes(session.common.quiet);
+    whole = take_whole_map(job.job, setting, result,
+                           [&](const SparsifyProgress& at) { nodes.show(at); });
+    if (!whole->why_not.empty()) {
+      // The policy's own map is the better, the more care its thresholds were found with.
+      session.note(fmt::format("the map is that of --strategy fpfl: {}", whole->why_not));
+      whole.reset();
+      if (guard.interrupted()) {
+        job.strategy = "fpfl";
+      } else {
+        job = prepare(options, "fpfl", setting, session);
+        result = run_job(job.job, nullptr);
+      }
+    }
+  }
+  results.write(options.save_thresholds, [&] {
+    write_thresholds(options.save_thresholds, job.job.policy.name,
+                     {.options = job.to_save, .poses = job.sample});
+  });
   CompactOutcome outcome{.name = recording.name,
                          .strategy = job.strategy,
                          .data = recording.data,
                          .found = job.found,
                          .thresholds = job.thresholds,
-                         .result = run_job(job.job, comparison ? &*comparison : nullptr),
-                         .control = {}};
+                         .result = std::move(result),
+                         .control = {},
+                         .whole = std::move(whole)};
   if (options.strategy == "rfpfl") {
     PolicyJob random = job.job;
     random.policy = {"random_poses",
@@ -393,7 +461,7 @@ int run_compact(const CompactOptions& options, Session& session) {
     outcome.control = run_job(random, nullptr);
   }
   const PolicyResult& shown = outcome.shown();
-  outcome.check = check_map(job.job, shown, setting);
+  outcome.check = outcome.whole ? outcome.whole->check : check_map(job.job, shown, setting);
   results.write(options.output, [&] {
     write_graph(shown.compact, options.output, registry,
                 output_format(options.output, options.output_format));
@@ -415,6 +483,9 @@ int run_compact(const CompactOptions& options, Session& session) {
   note_defaults(options, outcome, session);
   note_selection(options, outcome, session);
   note_distance(options, outcome, session);
+  if (outcome.whole) {
+    for (const std::string& note : outcome.whole->notes) session.note(note);
+  }
   results.add([&] { session.print(summary_text(options, outcome, results, session)); });
   results.finish();
   if (guard.interrupted()) return kExitInterrupted;
@@ -456,15 +527,18 @@ void add_compact_options(ArgumentParser cli, CompactOptions& options,
   cli.add_option("--begin", options.begin,
                  "begin at the pose with this id; those before are of earlier sessions")
       .type_name("ID");
-  cli.add_option("--recovery", options.recovery,
-                 "v0 evenly, v1 by distance, v2 along odometry, or likely")
+  cli.add_option(
+         "--recovery", options.recovery,
+         "put back what was left out: v0 evenly, v1 by distance, v2 along odometry, or likely")
       .type_name("HOW")
       .one_of({"v0", "v1", "v2", "likely"})
       .show_default();
-  cli.add_option("--strategy", options.strategy, "all or few poses and loops: apal, apfl, fpfl")
+  cli.add_option("--strategy", options.strategy,
+                 "few poses with all measurements (whole), or as a robot drives, all or few poses "
+                 "and loops: apal, apfl, fpfl [whole; fpfl with --map, landmarks or another "
+                 "registration]")
       .type_name("NAME")
-      .one_of(std::move(strategies))
-      .show_default();
+      .one_of(std::move(strategies));
   cli.add_option("--policy", options.policy, "the pose policy, with options as NAME:key=value")
       .component({"pose_policy"})
       .show_default();
@@ -511,7 +585,7 @@ Command add_compact(ArgumentParser program) {
   auto options = std::make_shared<CompactOptions>();  // lives as long as the parser and the run
   ArgumentParser cli = program.add_command(
       "compact", "compact pose SLAM: keep only the most informative poses and loop closures");
-  add_compact_options(cli, *options, {"apal", "apfl", "fpfl"});
+  add_compact_options(cli, *options, {"whole", "apal", "apfl", "fpfl"});
   cli.footer(
       "Example:\n"
       "  cairn compact my.g2o -o compact.g2o --trajectory full.g2o --json report.json\n"

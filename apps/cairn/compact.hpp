@@ -19,7 +19,7 @@ struct CompactOptions {
   std::string trajectory;
   std::string recovery = "v2";
   std::string policy = "compact_pose";
-  std::string strategy = "fpfl";
+  std::string strategy;  ///< empty: whole where the recording is known as such, else fpfl
   std::string estimator;
   std::string registration = "recorded";
   std::string map;          ///< of an earlier session
@@ -34,6 +34,7 @@ struct CompactOptions {
   InputOptions input;
   ProblemOptions problem;
   // Of studies, besides the strategy rfpfl:
+  bool is_study = false;  ///< the strategy is that of a robot by default: fpfl
   double error_ratio = 2.5;
   std::uint64_t seed = 1;
   std::string draw = "loops";

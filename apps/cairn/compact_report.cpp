@@ -97,9 +97,10 @@ json::object result_json(const PolicyResult& result, const PolicyData& data) {
   json::object errors;
   for (const auto& [name, error] : result.errors) errors[name] = error_json(error);
   report["errors"] = errors.empty() ? json::value(nullptr) : json::value(std::move(errors));
-  const auto v2 = result.errors.find("v2");
-  report["rmse"] =
-      v2 == result.errors.end() ? json::value(nullptr) : json::value(v2->second.ate_translation);
+  auto shown = result.errors.find("v2");
+  if (shown == result.errors.end()) shown = result.errors.find("whole");
+  report["rmse"] = shown == result.errors.end() ? json::value(nullptr)
+                                                : json::value(shown->second.ate_translation);
   if (result.normalized) {
     report["nees"] = {{"squared", result.normalized->squared}, {"dof", result.normalized->dof}};
   } else {
@@ -121,8 +122,18 @@ std::string errors_text(const TrajectoryError& e) {
       e.rpe_all_rotation);
 }
 
-void add_result(Table& table, const PolicyResult& result, const PolicyData& data,
-                const FoundThresholds& found) {
+std::string loops_text(const PolicyResult& result, const PolicyData& data, bool whole) {
+  const std::string matched =
+      fmt::format("{} pairs matched, {} of them well", result.proposed, result.registered);
+  if (whole) return fmt::format("all {} used; for the choice of poses {}", data.loops, matched);
+  return fmt::format("{} kept ({} of {} recorded); {}", result.kept_loops,
+                     percent(result.kept_loops, data.loops), data.loops, matched);
+}
+
+void add_result(Table& table, const CompactOutcome& outcome) {
+  const PolicyResult& result = outcome.shown();
+  const PolicyData& data = outcome.data;
+  const FoundThresholds& found = outcome.found;
   const auto in = static_cast<std::int64_t>(std::ssize(result.poses));
   const std::int64_t kept = result.kept_poses - result.map_poses;
   table.add(
@@ -130,10 +141,11 @@ void add_result(Table& table, const PolicyResult& result, const PolicyData& data
        fmt::format("{} of {} kept ({})", kept, in, percent(kept, in)) +
            (result.map_poses > 0 ? fmt::format(", beside {} of the map", result.map_poses) : "")});
   if (data.loops > 0 || result.registered > 0)
-    table.add(
-        {"loops", fmt::format("{} kept ({} of {} recorded); {} pairs matched, {} of them well",
-                              result.kept_loops, percent(result.kept_loops, data.loops), data.loops,
-                              result.proposed, result.registered)});
+    table.add({"loops", loops_text(result, data, outcome.whole.has_value())});
+  if (outcome.whole) {
+    table.add({"factors", fmt::format("{} for {}, KLD {:.3g} nats", outcome.whole->factors_out,
+                                      outcome.whole->factors_in, outcome.whole->kld)});
+  }
   if (data.priors > 0) {
     table.add({"priors", fmt::format("{} of {} kept ({})", result.kept_priors, data.priors,
                                      percent(result.kept_priors, data.priors))});
@@ -153,6 +165,9 @@ void add_result(Table& table, const PolicyResult& result, const PolicyData& data
                   : "")});
   }
   const StepTimes times(step_seconds(result));
+  const std::string whole =
+      outcome.whole ? fmt::format(", then {} for the whole", seconds_text(outcome.whole->seconds))
+                    : "";
   table.add(
       {"time",
        fmt::format("{} (estimate {}, covariances {}, search {}){}",
@@ -160,7 +175,8 @@ void add_result(Table& table, const PolicyResult& result, const PolicyData& data
                    seconds_text(result.seconds.covariances), seconds_text(result.seconds.search),
                    found.seconds > 0.0
                        ? fmt::format(", after {} for the thresholds", seconds_text(found.seconds))
-                       : "")});
+                       : "") +
+           whole});
   table.add({"a pose", times.text()});
   table.add({"chi2", chi2_text(result.chi2)});
   for (const auto& [name, error] : result.errors) table.add({name, errors_text(error)});
@@ -190,6 +206,13 @@ json::object report_json(const CompactOptions& options, const CompactOutcome& ou
     report["check"] = {{"distance", outcome.check->distance}, {"extent", outcome.check->extent}};
   } else {
     report["check"] = nullptr;
+  }
+  if (const auto& whole = outcome.whole) {
+    report["whole"] = {{"kld", number_json(whole->kld)},
+                       {"factors", {{"in", whole->factors_in}, {"out", whole->factors_out}}},
+                       {"seconds", whole->seconds}};
+  } else {
+    report["whole"] = nullptr;
   }
   report["recovery"] = options.recovery;
   report["map"] = text_json(options.map);
@@ -256,7 +279,7 @@ std::string summary_text(const CompactOptions& options, const CompactOutcome& ou
   if (!outcome.strategy.empty()) table.add({"strategy", outcome.strategy});
   if (const std::string line = thresholds_line(outcome.thresholds); !line.empty())
     table.add({"thresholds", line});
-  add_result(table, outcome.shown(), outcome.data, outcome.found);
+  add_result(table, outcome);
   if (outcome.check) table.add({"check", outcome.check->to_string()});
   if (outcome.result.interrupted) {
     table.add({"status", "interrupted"});

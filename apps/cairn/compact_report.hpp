@@ -11,6 +11,7 @@
 #include "cairn/policy/policy_run.hpp"
 #include "cairn/policy/threshold_search.hpp"
 #include "cairn/policy/uncertainty_comparison.hpp"
+#include "cairn/sparsification/whole_map.hpp"
 #include "compact.hpp"
 #include "results.hpp"
 #include "used_thresholds.hpp"
@@ -26,6 +27,7 @@ struct CompactOutcome {
   const UsedThresholds& thresholds;  ///< of the run, whatever was found
   PolicyResult result;
   std::optional<PolicyResult> control;  ///< as many poses and loops at random
+  std::optional<WholeMap> whole = {};   ///< `result` is of all measurements
   std::optional<MapCheck> check = {};   ///< of what is shown
 
   /// What is written and shown.

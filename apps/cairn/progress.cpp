@@ -94,4 +94,20 @@ bool GuessProgress::operator()(std::string_view what, double part) {
   return !interrupt_;
 }
 
+void NodeProgress::show(const SparsifyProgress& progress) {
+  const auto now = std::chrono::steady_clock::now();
+  const bool select = progress.phase == SparsifyProgress::Phase::select;
+  if (!select && now - shown_ < std::chrono::milliseconds(line_.on_terminal() ? 100 : 5000)) return;
+  shown_ = now;
+  if (select) return line_.show("choosing nodes");
+  const std::string done =
+      bar(static_cast<double>(progress.done) / static_cast<double>(progress.total), 30);
+  if (progress.phase == SparsifyProgress::Phase::feed) {
+    line_.show(fmt::format("{} pose {} of {}, {} kept", done, progress.done, progress.total,
+                           progress.kept));
+  } else {
+    line_.show(fmt::format("{} {} of {} nodes taken out", done, progress.done, progress.total));
+  }
+}
+
 }  // namespace cairn::app

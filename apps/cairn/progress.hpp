@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "cairn/solve/optimizer.hpp"
+#include "cairn/sparsification/sparsify_graph.hpp"
 
 namespace cairn::app {
 
@@ -62,6 +63,17 @@ class GuessProgress {
   StatusLine line_;
   const std::atomic<bool>& interrupt_;
   std::chrono::steady_clock::time_point last_shown_ = std::chrono::steady_clock::now();
+};
+
+/// Shows how far a sparsification is.
+class NodeProgress {
+ public:
+  explicit NodeProgress(bool quiet) : line_(quiet) {}
+  void show(const SparsifyProgress& progress);
+
+ private:
+  StatusLine line_;
+  std::chrono::steady_clock::time_point shown_ = std::chrono::steady_clock::now();
 };
 
 }  // namespace cairn::app

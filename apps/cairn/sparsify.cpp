@@ -232,32 +232,6 @@ std::string summary_text(const SparsifyCommandOptions& options, const LoadedGrap
   return table.text(false);
 }
 
-/// Shows how far a sparsification is.
-class NodeProgress {
- public:
-  explicit NodeProgress(bool quiet) : line_(quiet) {}
-  void show(const SparsifyProgress& progress) {
-    const auto now = std::chrono::steady_clock::now();
-    const bool select = progress.phase == SparsifyProgress::Phase::select;
-    if (!select && now - shown_ < std::chrono::milliseconds(line_.on_terminal() ? 100 : 5000))
-      return;
-    shown_ = now;
-    if (select) return line_.show("choosing nodes");
-    const std::string done =
-        bar(static_cast<double>(progress.done) / static_cast<double>(progress.total), 30);
-    if (progress.phase == SparsifyProgress::Phase::feed) {
-      line_.show(fmt::format("{} pose {} of {}, {} kept", done, progress.done, progress.total,
-                             progress.kept));
-    } else {
-      line_.show(fmt::format("{} {} of {} nodes taken out", done, progress.done, progress.total));
-    }
-  }
-
- private:
-  StatusLine line_;
-  std::chrono::steady_clock::time_point shown_ = std::chrono::steady_clock::now();
-};
-
 SparsifyResult sparsify(const Graph& graph, const SparsifyJob& job, const ProblemSetup& setup,
                         Stop stop, const InterruptGuard& guard, SparsificationObserver observer,
                         Session& session) {

@@ -34,12 +34,14 @@ namespace json = boost::json;
 
 Command add_study_compact(ArgumentParser study) {
   auto options = std::make_shared<CompactOptions>();  // lives as long as the parser and the run
+  options->is_study = true;
   ArgumentParser cli =
       study.add_command("compact", "cairn compact with a control, and beside everything");
   add_compact_options(cli, *options, {"apal", "apfl", "fpfl", "rfpfl"});
   cli.option("--strategy")
       .description(
-          "all or few poses and loops: apal, apfl, fpfl; rfpfl at random, as many as fpfl");
+          "all or few poses and loops: apal, apfl, fpfl; rfpfl at random, as many as fpfl "
+          "[fpfl]");
   cli.add_option("--seed", options->seed, "of rfpfl").type_name("N").show_default();
   cli.add_option("--draw", options->draw,
                  "of rfpfl: loop closures first, with the poses at their ends, or poses first, and "

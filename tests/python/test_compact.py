@@ -51,20 +51,25 @@ def same(result, report, compact):
     assert_array_equal(result.graph.states(Pose2), compact.states(Pose2))
 
 
-def test_it_does_what_the_program_does(tmp_path):
+@pytest.mark.parametrize("strategy", [None, "whole", "fpfl"])
+def test_it_does_what_the_program_does(tmp_path, strategy):
     graph, truth = city()
     graph.write(tmp_path / "in.g2o")
     truth.write(tmp_path / "truth.g2o")
     given = [part for key, value in OPTIONS.items() for part in [f"--{key.replace('_', '-')}", str(value)]]
-    report, out = program(tmp_path, *given, "--truth", "truth.g2o")
+    report, out = program(tmp_path, *given, "--truth", "truth.g2o", *(["--strategy", strategy] if strategy else []))
     graph, truth = cairn.read(tmp_path / "in.g2o"), cairn.read(tmp_path / "truth.g2o")
-    result = cairn.compact(graph, truth=truth, **OPTIONS)
+    result = cairn.compact(graph, truth=truth, strategy=strategy, **OPTIONS)
     same(result, report, out)
+    assert result.strategy == report["strategy"] == (strategy or "whole")
+    whole = result.strategy == "whole"
+    assert result.distance == report["check"]["distance"] and result.kld == (report["whole"]["kld"] if whole else None)
     assert 0 < result.counts["kept"] < result.counts["poses"] == 300
     assert result.trajectory.variable_count == 300 and result.thresholds == {}
-    assert result.errors["v2"].ate_translation == cairn.evaluate(result.trajectory, truth).ate_translation
+    assert result.errors["whole" if whole else "v2"].ate_translation == cairn.evaluate(result.trajectory, truth).ate_translation
     assert [pose.id for pose in result.poses] == list(range(300))
-    assert sum(link.verdict == "linked" for pose in result.poses for link in pose.links) == result.counts["kept_loops"]
+    linked = sum(link.verdict == "linked" for pose in result.poses for link in pose.links)
+    assert result.counts["kept_loops"] == (result.counts["loops"] if whole else linked)
 
 
 def test_thresholds_are_found_as_the_program_finds_them(tmp_path):
@@ -93,7 +98,7 @@ def test_a_registration_in_python_gives_what_recorded_gives(tmp_path):
         return recorded(graph, proposal)
 
     own = cairn.compact(graph, registration=match, **OPTIONS)
-    by_name = cairn.compact(graph, registration=cairn.spec("recorded", carry=0), **OPTIONS)
+    by_name = cairn.compact(graph, strategy="fpfl", registration=cairn.spec("recorded", carry=0), **OPTIONS)
     assert own.chi2 == by_name.chi2 and own.counts["kept_loops"] == by_name.counts["kept_loops"] > 0
     assert_array_equal(own.graph.states(Pose2), by_name.graph.states(Pose2))
     assert len(asked) == own.counts["proposed"]
@@ -186,7 +191,7 @@ def test_ctrl_c_ends_it_with_what_was_kept():
 
 def test_it_says_how_far_it_is_from_the_map_of_all_measurements():
     graph, _ = city()
-    few = cairn.compact(graph, range=8, angle=3.15, loop_gain=1e6, pose_gain=0)
+    few = cairn.compact(graph, strategy="fpfl", range=8, angle=3.15, loop_gain=1e6, pose_gain=0)
     everything = graph.copy()
     cairn.optimize(everything)
     estimate = np.array(few.trajectory.states(Pose2))[:, :2]
@@ -198,6 +203,33 @@ def test_it_says_how_far_it_is_from_the_map_of_all_measurements():
     assert few.distance > 0.05
     assert cairn.compact(graph, strategy="apal", range=100, angle=3.15).distance < 1e-5
     assert cairn.compact(graph, registration="recorded:false_rate=0.1", range=8, angle=3.15).distance is None
+
+
+def test_the_whole_map_is_the_estimate_of_all_measurements():
+    graph, _ = city()
+    result = cairn.compact(graph)
+    everything = graph.copy()
+    cairn.optimize(everything)
+    assert result.strategy == "whole" and result.graph.variable_count < 150 and result.trajectory.factor_count == 0
+    assert_allclose(result.trajectory.states(Pose2), everything.states(Pose2), atol=1e-6)
+    alone = result.graph.copy()
+    cairn.optimize(alone, initial=None)
+    assert_allclose(alone.states(Pose2), result.graph.states(Pose2), atol=1e-4)
+    moved = np.array([everything.at(int(i)).translation - alone.at(int(i)).translation for i in alone.ids()])
+    assert np.sqrt(np.mean(np.sum(moved**2, 1))) < 0.05
+
+
+def test_where_there_is_no_whole_map_it_says_why():
+    graph, _ = city(poses=100)
+    assert cairn.compact(graph, registration=lambda proposal: None, **OPTIONS).strategy == "fpfl"
+    for arguments in [{"registration": lambda proposal: None}, {"map": graph, "begin": 50}]:
+        with pytest.raises(cairn.Error, match="strategy=whole: "):
+            cairn.compact(graph, strategy="whole", **arguments, **OPTIONS)
+    with pytest.raises(cairn.Error, match="give one"):
+        cairn.compact(graph, "compact_pose:strategy=apfl", strategy="whole", **OPTIONS)
+    wrong, _ = cairn.generate("manhattan", seed=3, poses=300, outliers=20)
+    result = cairn.compact(wrong)
+    assert result.strategy == "fpfl" and any("measurements contradict each other" in note for note in result.notes), result.notes
 
 
 # Live --------------------------------------------------------------------------------------------
@@ -241,7 +273,7 @@ def test_with_everything_kept_it_is_dense_gauss_newton():
 
 def test_live_is_what_the_recording_gives():
     graph, _ = city()
-    recorded = cairn.compact(graph, registration="recorded:carry=0", **OPTIONS)
+    recorded = cairn.compact(graph, strategy="fpfl", registration="recorded:carry=0", **OPTIONS)
     policy = cairn.PosePolicy(**OPTIONS)
     pairs, z, information = graph.factor_ids("EDGE_SE2"), graph.measurements("EDGE_SE2"), graph.information("EDGE_SE2")
     factors = [Factor(Between(*pair, Pose2(*values)), information=matrix) for pair, values, matrix in zip(pairs, z, information)]

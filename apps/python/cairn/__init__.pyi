@@ -600,6 +600,10 @@ class CompactResult:
     @property
     def status(self) -> str: ...
     @property
+    def strategy(self) -> str: ...
+    @property
+    def kld(self) -> Optional[float]: ...
+    @property
     def policy(self) -> str: ...
     @property
     def graph(self) -> Graph: ...
@@ -630,6 +634,7 @@ def compact(
     graph: Graph,
     policy: str = ...,
     *,
+    strategy: Optional[str] = ...,
     registration: Any = ...,
     truth: Optional[Graph] = ...,
     map: Optional[Graph] = ...,

@@ -27,6 +27,7 @@
 #include "cairn/policy/threshold_search.hpp"
 #include "cairn/runtime/enum_names.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/sparsification/whole_map.hpp"
 #include "component_names.hpp"
 #include "follower.hpp"
 #include "interrupt.hpp"
@@ -42,6 +43,8 @@ struct BoundResult {
   PolicyData data;  ///< counts of the recording; its graphs are moved away
   std::unique_ptr<BoundGraph> compact, trajectory;
   std::optional<MapCheck> check;
+  std::optional<WholeMap> whole;
+  std::string strategy;
   std::vector<std::string> notes;
 
   std::string status() const {
@@ -54,6 +57,7 @@ struct BoundResult {
 /// What is run, and how.
 struct Plan {
   PolicyJob job;
+  std::string strategy{};  ///< empty: `whole` where it can be
   std::optional<PythonRegistration> own{};
   std::optional<bool> automatic;  ///< whether thresholds are found; none: unless some are given
   double sample = 0.6;
@@ -65,53 +69,108 @@ struct Plan {
   FactorSelector loss_on{};
 };
 
-/// Gives the policy its thresholds, and the strategy of few poses and few loop closures unless it
-/// has another. False: interrupted.
-bool complete(Plan& plan, const PolicySetting& setting, BoundResult& out) {
+constexpr const char* kWhole = "whole";
+
+/// The strategy of the plan, or of the policy's options; by default `whole` where that can be.
+/// Empty: the policy has none.
+std::string strategy_of(const Plan& plan, const PolicySetting& setting) {
+  const ComponentSpec& policy = plan.job.policy;
+  const auto own = policy.values.find("strategy");
+  if (own != policy.values.end()) {
+    if (!plan.strategy.empty() && plan.strategy != own->second) {
+      throw Error(ErrorCode::usage, "strategy= is given, and among the policy's options: give one");
+    }
+    return own->second;
+  }
+  const bool has_some =
+      setting.registry.options(PosePolicy::kKind, policy.name).find("strategy") != nullptr;
+  if (!has_some && !plan.strategy.empty())
+    throw Error(ErrorCode::usage, fmt::format("policy '{}' has no strategies", policy.name));
+  if (!has_some || (!plan.strategy.empty() && plan.strategy != kWhole)) return plan.strategy;
+  const std::string why_not =
+      plan.map ? "the trajectory continues a map (map=)" : why_no_whole_map(plan.job, setting);
+  if (why_not.empty()) return kWhole;
+  if (plan.strategy.empty()) return "fpfl";
+  throw Error(ErrorCode::usage, fmt::format("strategy={}: {}", kWhole, why_not));
+}
+
+/// A job of this strategy with the thresholds that are found for it. False: interrupted.
+bool complete(const Plan& plan, const PolicySetting& setting, PolicyJob& job, BoundResult& out) {
   Registry& registry = setting.registry;
-  OptionValues& options = plan.job.policy.values;
+  job = plan.job;
+  OptionValues& options = job.policy.values;
   const bool automatic = plan.automatic.value_or(
-      !gives_thresholds(plan.job.policy) && finds_thresholds(plan.job.policy, registry) &&
+      !gives_thresholds(job.policy) && finds_thresholds(job.policy, registry) &&
       (setting.data.loops > 0 || setting.data.observations == 0));
   if (automatic) {
     const ThresholdSample sample = threshold_sample(setting.data, plan.sample);
-    out.found = find_thresholds(plan.job, sample.count, plan.error_ratio, setting);
+    // The error of a whole map does not depend on which loop closures the policy uses.
+    const double ratio = out.strategy == kWhole ? 0.0 : plan.error_ratio;
+    out.found = find_thresholds(job, sample.count, ratio, setting);
     if (setting.interrupted()) return false;
     for (const auto& [name, value] : out.found.options) options.emplace(name, value);
   }
   if (plan.keep > 0 && !options.emplace("keep", fmt::format("{}", plan.keep)).second)
     throw Error(ErrorCode::usage, "keep= is given, and among the policy's options: give one");
-  if (registry.options(PosePolicy::kKind, plan.job.policy.name).find("strategy"))
-    options.emplace("strategy", "fpfl");
+  if (!out.strategy.empty())
+    options.emplace("strategy", out.strategy == kWhole ? "fpfl" : out.strategy);
   return true;
 }
 
-/// Without the interpreter's lock.
-void run(Plan& plan, const PolicySetting& setting, Follower& follower, BoundResult& out) {
-  if (!complete(plan, setting, out)) {
+/// Runs the policy. False: interrupted before that.
+bool select(const Plan& plan, const PolicySetting& setting, Follower& follower, PolicyJob& job,
+            BoundResult& out) {
+  if (!complete(plan, setting, job, out)) {
     out.result.interrupted = true;
     out.notes.emplace_back("interrupted before anything was selected");
-    return;
+    return false;
   }
   follower.follow();
-  PolicyRun policy(plan.job, setting);
+  PolicyRun policy(job, setting);
   if (plan.map) policy.load(*plan.map);
-  policy.run(setting.data.poses.size(), plan.job.policy.name);
+  policy.run(setting.data.poses.size(), job.policy.name);
   out.result = policy.finish(plan.recovery);
-  out.check = check_map(plan.job, out.result, setting);
-  if (out.check && out.check->is_far()) {
+  return true;
+}
+
+/// The map of all measurements in the place of the policy's own; where there is none, that of the
+/// strategy fpfl, whose thresholds are found with more care.
+void make_whole(const Plan& plan, const PolicySetting& setting, Follower& follower, PolicyJob& job,
+                BoundResult& out) {
+  WholeMap whole = take_whole_map(job, setting, out.result);
+  if (whole.why_not.empty()) {
+    out.notes = whole.notes;
+    out.check = whole.check;
+    out.whole = std::move(whole);
+    return;
+  }
+  out.strategy = "fpfl";
+  out.notes.push_back(fmt::format("the map is that of strategy fpfl: {}", whole.why_not));
+  if (!setting.interrupted()) select(plan, setting, follower, job, out);
+}
+
+/// Without the interpreter's lock.
+void run(const Plan& plan, const PolicySetting& setting, Follower& follower, BoundResult& out) {
+  PolicyJob job;
+  out.strategy = strategy_of(plan, setting);
+  if (!select(plan, setting, follower, job, out)) return;
+  if (out.strategy == kWhole) make_whole(plan, setting, follower, job, out);
+  if (!out.whole) out.check = check_map(job, out.result, setting);
+  if (out.whole) {
+    if (out.whole->advice) out.notes.push_back(to_string(*out.whole->advice));
+  } else if (out.check && out.check->is_far()) {
     out.notes.push_back(fmt::format(
-        "the map is {}: a lower loop_gain uses more loop closures; cairn.sparsify keeps few poses, "
-        "and the estimate of all measurements",
+        "the map is {}: strategy='whole' keeps as few poses with the estimate of all measurements, "
+        "a lower loop_gain uses more loop closures",
         out.check->to_string()));
   }
   SelectionCheck check;
   for (const PoseReport& pose : out.result.poses) check.add(pose);
   const FoundThresholds* found = out.found.seconds > 0.0 ? &out.found : nullptr;
   if (!out.result.interrupted && out.result.located &&
-      finds_thresholds(plan.job.policy, setting.registry)) {
-    for (const auto& advice : check.advice(found, setting.data.loops))
-      out.notes.push_back(to_string(advice));
+      finds_thresholds(job.policy, setting.registry)) {
+    const std::int64_t loops = out.whole ? 0 : setting.data.loops;
+    for (const auto& advice : check.advice(found, loops)) out.notes.push_back(to_string(advice));
   }
   for (std::string& doubt : notes_on_estimate(out.result.compact, chi2(out.result.compact)).notes)
     out.notes.push_back(std::move(doubt));
@@ -124,6 +183,7 @@ const Graph& graph_of(const py::object& given, const char* what) {
 }
 
 std::unique_ptr<BoundResult> compact(BoundGraph& recording, const std::string& policy,
+                                     const std::optional<std::string>& strategy,
                                      const py::object& registration, const py::object& truth,
                                      const py::object& map, std::optional<Id> begin,
                                      std::optional<bool> automatic, double sample, int keep,
@@ -131,6 +191,7 @@ std::unique_ptr<BoundResult> compact(BoundGraph& recording, const std::string& p
                                      const std::string& loss_on, const py::object& callback,
                                      const py::kwargs& options) {
   Plan plan{.job = {component_spec(policy, options, PosePolicy::kKind, "compact")},
+            .strategy = strategy.value_or(""),
             .automatic = automatic,
             .sample = sample,
             .keep = keep,
@@ -224,6 +285,15 @@ void bind_result(py::module_& module) {
       .def_property_readonly("status", &BoundResult::status,
                              "'converged', 'max_iterations', 'interrupted', or 'unlocated': no "
                              "match with the map that was to be continued.")
+      .def_readonly("strategy", &BoundResult::strategy,
+                    "'whole', or that of the policy; empty: it has none.")
+      .def_property_readonly(
+          "kld",
+          [](const BoundResult& bound) {
+            return bound.whole ? std::optional(bound.whole->kld) : std::nullopt;
+          },
+          "With the strategy 'whole': divergence of the graph from the estimate of all "
+          "measurements, of the poses that are kept [nats]; else None.")
       .def_property_readonly(
           "policy", [](const BoundResult& bound) { return bound.result.policy; },
           "The policy with all its options, those that were found among them.")
@@ -233,7 +303,8 @@ void bind_result(py::module_& module) {
       .def_property_readonly(
           "trajectory", [](const BoundResult& bound) { return bound.trajectory.get(); },
           py::return_value_policy::reference_internal,
-          "All poses, those left out put back; without factors.")
+          "All poses, those left out put back; without factors. With the strategy 'whole', the "
+          "estimate of all measurements.")
       .def_property_readonly(
           "poses", [](const BoundResult& bound) { return bound.result.poses; },
           "A PoseReport for each pose, in the order of arrival.")
@@ -248,7 +319,8 @@ void bind_result(py::module_& module) {
           "chi2", [](const BoundResult& bound) { return bound.result.chi2; }, "Of what was kept.")
       .def_property_readonly(
           "errors", [](const BoundResult& bound) { return bound.result.errors; },
-          "With the truth: a TrajectoryError of all poses, by the name of each recovery.")
+          "With the truth: a TrajectoryError of all poses, by the name of each recovery, or "
+          "'whole'.")
       .def_property_readonly("nees", &nees_of,
                              "With the truth of all poses: (e^T Sigma^-1 e, degrees of freedom), "
                              "the mean of the first being the second where the covariance is "
@@ -258,8 +330,9 @@ void bind_result(py::module_& module) {
           [](const BoundResult& bound) {
             return bound.check ? std::optional(bound.check->distance) : std::nullopt;
           },
-          "How far all poses are from the map of all measurements, after alignment, root mean "
-          "square [m]; None where that map is no measure of it: another map was continued, matches "
+          "How far all poses (strategy 'whole': those of the graph) are from the map of all "
+          "measurements, after alignment, root mean square [m]; None where that map is no measure "
+          "of it: another map was continued, matches "
           "were inconsistent, or they were not those of the graph.")
       .def_property_readonly(
           "thresholds", [](const BoundResult& bound) { return bound.found.options; },
@@ -282,8 +355,8 @@ void bind_compact(py::module_& module) {
   bind_result(module);
   module.def(
       "compact", &compact, py::arg("graph"), py::arg("policy") = "compact_pose", py::kw_only(),
-      py::arg("registration") = "recorded", py::arg("truth") = py::none(),
-      py::arg("map") = py::none(), py::arg("begin") = py::none(),
+      py::arg("strategy") = py::none(), py::arg("registration") = "recorded",
+      py::arg("truth") = py::none(), py::arg("map") = py::none(), py::arg("begin") = py::none(),
       py::arg("find_thresholds") = py::none(), py::arg("sample") = 0.6, py::arg("keep") = 0,
       py::arg("recovery") = "v2", py::arg("loss") = py::none(), py::arg("loss_on") = "all",
       py::arg("callback") = py::none(),
@@ -291,6 +364,9 @@ void bind_compact(py::module_& module) {
 
 graph: poses with unbroken odometry by rising id, loop closures, absolute measurements, landmarks; it stays as it is.
 policy: a name of `cairn.components("pose_policy")`; its options are further keyword arguments.
+strategy: "whole", the poses that the policy keeps with the information of all measurements of the graph; or what a robot
+    can know while it drives: "fpfl", few poses and few loop closures, "apfl", all poses, "apal", all of both. None:
+    "whole", and "fpfl" where that cannot be: with map=, landmarks, or another registration than "recorded".
 registration: measures the pairs that the policy proposes: a name of `cairn.components("registration")`, of which
     "recorded" answers by the graph; or written in Python, a function match(proposal) that is given a MatchProposal and
     returns a Factor, several, or None for no match. An object with such a method may have three more:

@@ -32,6 +32,8 @@ Graph recording_at(const PolicyResult& result, const PolicySetting& setting) {
   return whole;
 }
 
+}  // namespace
+
 bool matches_as_recorded(const PolicyJob& job) {
   if (job.own) return false;
   const ComponentSpec registration = parse_component(job.registration);
@@ -48,29 +50,45 @@ double extent_of(const Trajectory& poses) {
   return std::sqrt(squares);
 }
 
-}  // namespace
-
 std::string MapCheck::to_string() const {
   return fmt::format("{:.3g} m from the map of all measurements, {:.2g} % of its extent", distance,
                      extent > 0.0 ? 100.0 * distance / extent : 0.0);
 }
 
-std::optional<MapCheck> check_map(const PolicyJob& job, const PolicyResult& result,
-                                  const PolicySetting& setting) {
-  if (!matches_as_recorded(job)) return std::nullopt;
-  if (result.interrupted || result.map_poses > 0 || result.poses.size() < 2) return std::nullopt;
-  if (result.verdicts.contains("inconsistent")) return std::nullopt;
-  Graph whole = recording_at(result, setting);
+EstimateOfAll estimate_of_all(const PolicyJob& job, const PolicyResult& result,
+                              const PolicySetting& setting) {
+  if (!matches_as_recorded(job)) return {.why_not = "what matches is not what was recorded"};
+  if (result.interrupted) return {.why_not = "the run was interrupted"};
+  if (result.map_poses > 0) return {.why_not = "the run continues another map"};
+  if (result.poses.size() < 2) return {.why_not = "the recording has one pose"};
+  if (result.verdicts.contains("inconsistent"))
+    return {.why_not = "matches contradict each other, and some of the measurements are wrong"};
+  EstimateOfAll all{.graph = recording_at(result, setting)};
   const auto optimizer = setting.registry.make<Optimizer>(kOptimizer);
   const auto guess = setting.registry.make<InitialGuess>(kGuess);
   const Stop stop{.interrupt = setting.interrupt};
   Observer observer;
   const Summary summary =
-      optimize(whole, {*optimizer, kOptimizer, guess.get(), kGuess}, stop, observer);
-  const std::int64_t dof = degrees_of_freedom(whole, resolve_gauge(whole));
-  if (summary.status != Status::converged || !is_plausible(summary.final_chi2, dof))
-    return std::nullopt;
-  const Trajectory everything = trajectory(whole);
+      optimize(all.graph, {*optimizer, kOptimizer, guess.get(), kGuess}, stop, observer);
+  all.chi2 = summary.final_chi2;
+  const std::int64_t dof = degrees_of_freedom(all.graph, resolve_gauge(all.graph));
+  if (summary.status != Status::converged) {
+    all.why_not =
+        fmt::format("the optimisation of all measurements ended as {}", to_string(summary.status));
+  } else if (!is_plausible(all.chi2, dof)) {
+    all.why_not = fmt::format(
+        "measurements contradict each other: chi2 of all of them is {:.3g} times the degrees of "
+        "freedom",
+        all.chi2 / static_cast<double>(dof));
+  }
+  return all;
+}
+
+std::optional<MapCheck> check_map(const PolicyJob& job, const PolicyResult& result,
+                                  const PolicySetting& setting) {
+  const EstimateOfAll all = estimate_of_all(job, result, setting);
+  if (!all.why_not.empty()) return std::nullopt;
+  const Trajectory everything = trajectory(all.graph);
   return MapCheck{absolute_error(trajectory(result.trajectory), everything), extent_of(everything)};
 }
 

@@ -79,6 +79,12 @@ bool has_all_of(const Graph& truth, const Graph& recording) {
   return true;
 }
 
+void evaluate_map(const PolicyData& data, PolicyResult& result) {
+  // A map without a common frame is nowhere in that of the truth.
+  if (result.located && data.truth_graph && has_all_of(*data.truth_graph, result.compact))
+    result.normalized = normalized_error(result.compact, *data.truth_graph);
+}
+
 void evaluate(PosePolicy& policy, const PolicyData& data, PolicyResult& result) {
   if (!data.truth) return;
   try {
@@ -89,9 +95,7 @@ void evaluate(PosePolicy& policy, const PolicyData& data, PolicyResult& result) 
   } catch (const Error& error) {  // too few poses to compare, when it was interrupted
     if (!result.interrupted || error.code() != ErrorCode::input) throw;
   }
-  // A map without a common frame is nowhere in that of the truth.
-  if (result.located && data.truth_graph && has_all_of(*data.truth_graph, result.compact))
-    result.normalized = normalized_error(result.compact, *data.truth_graph);
+  evaluate_map(data, result);
 }
 
 /// Before any work: what the policy would refuse when a pose sees it.
@@ -228,6 +232,12 @@ void PolicyRun::run(std::size_t count, std::string_view title,
                                *policy_, watched, count_pose);
               });
   result_.interrupted = setting_.interrupted();
+}
+
+void evaluate_again(PolicyResult& result, const PolicyData& data, const std::string& name) {
+  if (!data.truth) return;
+  result.errors = {{name, compare(trajectory(result.trajectory), *data.truth)}};
+  evaluate_map(data, result);
 }
 
 PolicyResult PolicyRun::finish(Recovery recovery) {

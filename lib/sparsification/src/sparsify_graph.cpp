@@ -62,9 +62,12 @@ bool is_open(const Graph& graph, int v, NodeKind kind) {
 }
 
 /// Which of the graph's variables may leave: all of a kind but the first pose, those that hold the
-/// gauge, and the newest pose.
-std::vector<int> open_nodes(const Graph& graph, NodeKind kind) {
+/// gauge, the newest pose, and those that are to stay.
+std::vector<int> open_nodes(const Graph& graph, NodeKind kind, std::span<const Id> kept) {
   std::vector<int> nodes, stay = resolve_gauge(graph).anchored;
+  for (const Id id : kept) {
+    if (const auto there = graph.find(id)) stay.push_back(*there);
+  }
   int first = -1, newest = -1;
   for (int v = 0; v < graph.variable_count(); ++v) {
     if (is_open(graph, v, kind)) nodes.push_back(v);
@@ -73,7 +76,8 @@ std::vector<int> open_nodes(const Graph& graph, NodeKind kind) {
     newest = v;
   }
   stay.insert(stay.end(), {first, newest});
-  std::erase_if(nodes, [&](int v) { return std::ranges::find(stay, v) != stay.end(); });
+  std::ranges::sort(stay);
+  std::erase_if(nodes, [&](int v) { return std::ranges::binary_search(stay, v); });
   return nodes;
 }
 
@@ -152,7 +156,7 @@ SparsifyResult sparsify_whole(const Graph& graph, const SparsifyJob& job,
     }
   }
   report(setting, {SparsifyProgress::Phase::select});
-  const std::vector<int> open = open_nodes(original, job.nodes);
+  const std::vector<int> open = open_nodes(original, job.nodes, job.stay);
   if (open.empty()) {
     result.notes.push_back(fmt::format("nothing was taken out: the graph has no {} that may leave",
                                        job.nodes == NodeKind::landmarks ? "landmark"

@@ -52,7 +52,7 @@ struct PolicyResult {
   std::vector<PoseReport> poses;
   Graph compact;     ///< the estimate of what was kept
   Graph trajectory;  ///< the whole trajectory: what was left out is put back
-  /// By the name of the recovery ("v0", …); empty without the truth.
+  /// By the name of the recovery ("v0", …), or "whole" (`take_whole_map`); empty without the truth.
   std::map<std::string, TrajectoryError> errors;
   std::optional<NormalizedError> normalized;
   double chi2 = 0.0;
@@ -119,6 +119,11 @@ class CAIRN_API PolicyRun {
   Registration* registration_;
   PolicyResult result_;
 };
+
+/// Replaces the errors and the NEES of a result, whose graphs have been replaced: the trajectory's
+/// errors are under this name. Nothing without the truth.
+CAIRN_API void evaluate_again(PolicyResult& result, const PolicyData& data,
+                              const std::string& name);
 
 /// "compact_pose:range=5,angle=0.5"
 CAIRN_API std::string spec_text(const ComponentSpec& spec);

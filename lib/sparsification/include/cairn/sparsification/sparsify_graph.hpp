@@ -37,7 +37,8 @@ struct SparsifyJob {
   ComponentSpec sparsifier;  ///< with its options
   ComponentSpec selection;
   ComponentSpec optimizer;
-  NodeKind nodes = NodeKind::poses;                ///< that the selection chooses from
+  NodeKind nodes = NodeKind::poses;  ///< that the selection chooses from
+  std::vector<Id> stay = {};  ///< of a whole graph: these do not leave, whatever the selection
   std::string linear_solver = "block_cholesky";    ///< for determinants
   std::string estimator = "incremental_cholesky";  ///< online
   int online = 0;                                  ///< online: take nodes out after so many poses

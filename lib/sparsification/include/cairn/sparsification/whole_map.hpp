@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cairn/policy/map_check.hpp"
+#include "cairn/policy/policy_run.hpp"
+#include "cairn/policy/selection_check.hpp"
+#include "cairn/runtime/api.hpp"
+#include "cairn/sparsification/sparsify_graph.hpp"
+
+namespace cairn {
+
+/// The map of a recording that is known as a whole: the poses that a policy has kept, with the
+/// information of all measurements, those that it has left out among them.
+struct WholeMap {
+  /// Empty: the result of the run has been replaced. Else a sentence without its full stop: why the
+  /// run's own map is all there is.
+  std::string why_not = {};
+  /// How far the poses of the compact graph are, at its own minimum, from the estimate of all
+  /// measurements.
+  MapCheck check = {};
+  /// Where that is far: a threshold with which less is lost.
+  std::optional<SelectionCheck::Advice> advice = {};
+  double kld = 0.0;  ///< from that estimate, of the poses of both [nats]; NaN: not known
+  std::int64_t factors_in = 0, factors_out = 0;  ///< of the recording and of the compact graph
+  double seconds = 0.0;
+  std::vector<std::string> notes = {};
+};
+
+/// Why a run of `job` cannot end in such a map, before it has begun: matches are not those of the
+/// recording (`matches_as_recorded`), or the recording has landmarks. Empty: it can.
+CAIRN_API std::string why_no_whole_map(const PolicyJob& job, const PolicySetting& setting);
+
+/// Replaces what a run has found by what all measurements say: optimises the recording, from the
+/// trajectory of the run (`estimate_of_all`), and takes the poses that the policy has not kept out
+/// of it, by factors that stand for theirs (`sparsify_whole`). The compact graph of `result` is
+/// then what is left, at its minimum; the trajectory is the estimate of all measurements; chi2 is
+/// that of all measurements, of which all are kept; errors are under the name "whole". Nothing is
+/// replaced where `why_not` says why. `progress` may be empty.
+CAIRN_API WholeMap
+take_whole_map(const PolicyJob& job, const PolicySetting& setting, PolicyResult& result,
+               const std::function<void(const SparsifyProgress&)>& progress = {});
+
+}  // namespace cairn

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/sparsification/whole_map.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include <fmt/core.h>
+
+#include "cairn/geometry/pose.hpp"
+#include "cairn/runtime/timed.hpp"
+
+namespace cairn {
+namespace {
+
+/// All that may leave does, but for the poses that the job names; those with few neighbours first.
+constexpr const char* kSelection = "smallest_blanket:part=1";
+
+SparsifyResult take_out(const Graph& all, const PolicySetting& setting, const PolicyResult& chosen,
+                        const std::function<void(const SparsifyProgress&)>& progress) {
+  SparsifyJob job{.sparsifier = parse_component("sparsify"),
+                  .selection = parse_component(kSelection),
+                  .optimizer = parse_component("levenberg_marquardt"),
+                  .as_given = true};
+  for (int v = 0; v < chosen.compact.variable_count(); ++v)
+    job.stay.push_back(chosen.compact.id(v));
+  return sparsify_whole(all, job,
+                        {.registry = setting.registry,
+                         .stop = {.interrupt = setting.interrupt},
+                         .loss = setting.loss,
+                         .loss_on = setting.loss_on,
+                         .progress = progress});
+}
+
+Graph without_factors(const Graph& graph) {
+  Graph poses;
+  for (int v = 0; v < graph.variable_count(); ++v)
+    poses.add_variable(graph.type_of(v), graph.id(v), graph.state(v));
+  return poses;
+}
+
+int poses_of(const Graph& graph) {
+  int poses = 0;
+  for (int v = 0; v < graph.variable_count(); ++v) poses += !is_point(graph.type(v));
+  return poses;
+}
+
+void replace(PolicyResult& result, const EstimateOfAll& all, SparsifyResult sparse,
+             const PolicySetting& setting) {
+  result.compact = std::move(sparse.sparse);
+  result.trajectory = without_factors(all.graph);
+  result.chi2 = all.chi2;
+  result.kept_loops = setting.data.loops;
+  result.kept_priors = setting.data.priors;
+  result.kept_poses = poses_of(result.compact);
+  result.converged = sparse.converged;
+  result.information_nonzeros = sparse.nonzeros_after.information;
+  result.factor_nonzeros = sparse.nonzeros_after.factor;
+  evaluate_again(result, setting.data, "whole");
+}
+
+/// A lower gain of poses than that of the run.
+OptionValues lower_pose_gain(const PolicyJob& job, const PolicySetting& setting) {
+  constexpr const char* kName = "pose_gain";
+  const auto given = job.policy.values.find(kName);
+  if (given != job.policy.values.end())
+    return {{kName, fmt::format("{:.3g}", 0.5 * std::stod(given->second))}};
+  const OptionSpec* own = setting.registry.options(PosePolicy::kKind, job.policy.name).find(kName);
+  if (!own) return {};
+  return {{kName, fmt::format("{:.3g}", 0.5 * std::stod(own->default_value))}};
+}
+
+}  // namespace
+
+std::string why_no_whole_map(const PolicyJob& job, const PolicySetting& setting) {
+  if (!matches_as_recorded(job))
+    return "what matches is not what was recorded, and so there is no map of all measurements";
+  if (setting.data.landmarks > 0) return "the recording has landmarks";
+  return {};
+}
+
+WholeMap take_whole_map(const PolicyJob& job, const PolicySetting& setting, PolicyResult& result,
+                        const std::function<void(const SparsifyProgress&)>& progress) {
+  const auto begin = std::chrono::steady_clock::now();
+  WholeMap map{.why_not = why_no_whole_map(job, setting)};
+  if (!map.why_not.empty()) return map;
+  const EstimateOfAll all = estimate_of_all(job, result, setting);
+  map.why_not = all.why_not;
+  if (!map.why_not.empty()) return map;
+  SparsifyResult sparse = take_out(all.graph, setting, result, progress);
+  if (sparse.interrupted) {
+    map.why_not = "it was interrupted before the map of all measurements was made";
+    return map;
+  }
+  map.check = {.distance = sparse.error ? sparse.error->rmse_aligned : std::nan(""),
+               .extent = extent_of(trajectory(all.graph))};
+  if (map.check.is_far()) {
+    map.advice = {.finding = fmt::format("the map is {}", map.check.to_string()),
+                  .options = lower_pose_gain(job, setting),
+                  .effect = "keeps more poses, and loses less"};
+    if (map.advice->options.empty()) map.advice.reset();
+  }
+  map.kld = sparse.error ? sparse.error->kld : std::nan("");
+  map.factors_in = sparse.factors_before;
+  map.factors_out = sparse.sparse.factor_count();
+  map.notes = std::move(sparse.notes);
+  replace(result, all, std::move(sparse), setting);
+  map.seconds = seconds_since(begin);
+  return map;
+}
+
+}  // namespace cairn
