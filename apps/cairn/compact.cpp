@@ -53,8 +53,14 @@ Recording load_recording(const CompactOptions& options, Session& session) {
     loaded.truth = load_ground_truth(options.truth, options.input, session).graph;
   std::optional<Graph> map;
   if (!options.map.empty()) map = load_graph(options.map, options.input, session).graph;
-  return {loaded.name, policy_data(std::move(loaded.graph), std::move(loaded.truth), options.begin),
-          std::move(map)};
+  const Gaps gaps = map ? Gaps::refuse : Gaps::bridge;
+  Recording recording{
+      loaded.name,
+      policy_data(std::move(loaded.graph), std::move(loaded.truth), options.begin, gaps),
+      std::move(map)};
+  if (const std::string bridged = to_string(recording.data.gaps); !bridged.empty())
+    session.note(bridged);
+  return recording;
 }
 
 /// Where a trajectory begins on a map is not known, whatever its first pose says.

@@ -127,6 +127,22 @@ TEST_F(Compact, TheWholeMapIsTheEstimateOfAllMeasurements) {
   }
 }
 
+TEST_F(Compact, ARecordingWithAGapInItsOdometryIsTaken) {
+  const std::string in = folder_.file("in.g2o"), way = folder_.file("way.g2o"),
+                    all = folder_.file("all.g2o");
+  ASSERT_EQ(cairn({"generate", "manhattan:poses=300,streets=5", "-o", in}).exit_code, 0);
+  std::string without;
+  for (const std::string& line : lines(read_text(in)))
+    if (!line.starts_with("EDGE_SE2 99 100 ")) without += line + '\n';
+  write_text(in, without);
+  const Outcome run = cairn({"compact", in, "--trajectory", way});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(on_one_line(run.err), HasSubstr("no factor joins pose 99 to pose 100"));
+  ASSERT_EQ(cairn({"optimize", in, "-o", all}).exit_code, 0);
+  const boost::json::value apart = parse_json(cairn({"evaluate", way, all, "--json", "-"}).out);
+  EXPECT_LT(apart.at("ate").at("translation").to_number<double>(), 1e-6);
+}
+
 TEST_F(Compact, ThereIsNoWholeMapOfMeasurementsThatContradictEachOther) {
   const std::string world = "@manhattan:poses=300,streets=5,outliers=20";
   const Outcome run = cairn({"compact", world, "--json", folder_.file("report.json")});

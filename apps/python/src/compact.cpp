@@ -139,7 +139,7 @@ void make_whole(const Plan& plan, const PolicySetting& setting, Follower& follow
                 BoundResult& out) {
   WholeMap whole = take_whole_map(job, setting, out.result);
   if (whole.why_not.empty()) {
-    out.notes = whole.notes;
+    out.notes.insert(out.notes.end(), whole.notes.begin(), whole.notes.end());
     out.check = whole.check;
     out.whole = std::move(whole);
     return;
@@ -210,7 +210,10 @@ std::unique_ptr<BoundResult> compact(BoundGraph& recording, const std::string& p
   if (!truth.is_none()) true_graph = graph_of(truth, "truth").clone();
   if (!map.is_none()) plan.map = graph_of(map, "map").clone();
   auto out = std::make_unique<BoundResult>();
-  out->data = policy_data(recording.get().clone(), std::move(true_graph), begin);
+  out->data = policy_data(recording.get().clone(), std::move(true_graph), begin,
+                          plan.map ? Gaps::refuse : Gaps::bridge);
+  if (std::string bridged = to_string(out->data.gaps); !bridged.empty())
+    out->notes.push_back(std::move(bridged));
   const InterruptGuard guard;
   Follower follower(callback, guard.flag());
   const PolicySetting setting{

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include <fmt/core.h>
 
@@ -19,9 +20,15 @@ namespace {
 constexpr const char* kOptimizer = "levenberg_marquardt";
 constexpr const char* kGuess = "auto";
 
-/// The recording with the poses of the run, and its landmarks where it has them.
+/// The recording, without what bridges gaps, with the poses of the run, and its landmarks where it
+/// has them.
 Graph recording_at(const PolicyResult& result, const PolicySetting& setting) {
   Graph whole = setting.data.recording.clone();
+  if (!setting.data.gaps.empty()) {
+    std::vector<bool> bridges(whole.factor_count());
+    for (const OdometryGap& gap : setting.data.gaps) bridges[gap.factor] = true;
+    whole.remove(bridges, std::vector<bool>(whole.variable_count()));
+  }
   whole.set_loss(setting.loss, setting.loss_on);
   for (const Graph* from : {&result.compact, &result.trajectory}) {
     for (int v = 0; v < from->variable_count(); ++v) {

@@ -13,6 +13,7 @@
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/timed.hpp"
+#include "odometry_gaps.hpp"
 
 namespace cairn {
 namespace {
@@ -119,8 +120,10 @@ void check_landmarks(const PosePolicy& policy, const std::string& name, const Gr
 
 }  // namespace
 
-PolicyData policy_data(Graph recording, std::optional<Graph> truth, std::optional<Id> begin) {
+PolicyData policy_data(Graph recording, std::optional<Graph> truth, std::optional<Id> begin,
+                       Gaps gaps) {
   PolicyData data;
+  if (gaps == Gaps::bridge) data.gaps = bridge_gaps(recording, begin);
   data.poses = pose_chain(recording, begin);
   for (const Arrival& pose : data.poses) {
     data.loops += std::ssize(pose.links);

@@ -2,12 +2,14 @@
 #include "cairn/policy/policy_run.hpp"
 
 #include <atomic>
+#include <cmath>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <Eigen/Dense>
 
 #include "cairn/geometry/pose.hpp"
 #include "cairn/io/generator.hpp"
@@ -53,6 +55,60 @@ TEST_F(PolicyRunTest, ATruthThatLacksPosesIsGoodForTheTrajectoryOnly) {
   const PolicyData data = policy_data(std::move(made.graph), std::move(shorter.truth));
   EXPECT_FALSE(data.truth_graph.has_value());
   EXPECT_THAT(*data.truth, SizeIs(12));
+}
+
+/// Poses 0 to 4 on a line, without odometry from 1 to 2: a way by 3, and another, less certain,
+/// by 4.
+Graph with_a_gap(Registry& registry, bool with_way) {
+  Graph graph;
+  for (int k = 0; k < 5; ++k) {
+    const double state[] = {k + 0.0, 0.0, 0.0};
+    graph.add_variable(registry.variable_type("VERTEX_SE2"), k, state);
+  }
+  const auto add = [&](Id a, Id b, std::vector<double> z, double information) {
+    graph.add({.type = registry.factor_type("EDGE_SE2"),
+               .variables = {a, b},
+               .measurement = std::move(z),
+               .information = {information, 0, 0, information, 0, information}});
+  };
+  add(0, 1, {1, 0, 0}, 100);
+  add(2, 3, {1, 0, 0}, 100);
+  add(3, 4, {1, 0, 0.5}, 100);
+  if (!with_way) return graph;
+  add(3, 1, {-2, 0, 0.25}, 100);
+  add(1, 4, {3, 0, 0}, 1);
+  return graph;
+}
+
+TEST_F(PolicyRunTest, AGapInOdometryIsBridgedByTheMostCertainWay) {
+  const PolicyData data = policy_data(with_a_gap(registry_, true), {}, {}, Gaps::bridge);
+  ASSERT_THAT(data.gaps, SizeIs(1));
+  EXPECT_EQ(data.gaps[0].before, 1);
+  EXPECT_EQ(data.gaps[0].after, 2);
+  EXPECT_EQ(data.gaps[0].measurements, 2);
+  EXPECT_EQ(data.loops, 2);
+  ASSERT_THAT(data.poses[2].odometry, ElementsAre(data.gaps[0].factor));
+  const Factor bridge = data.recording.factor(data.gaps[0].factor);
+  EXPECT_THAT(bridge.variables, ElementsAre(1, 2));
+  // From 1 to 3 is (-2, 0, 0.25) backwards, from 3 to 2 (1, 0, 0) backwards.
+  const double c = std::cos(0.25), s = std::sin(0.25);
+  const std::vector<double> expected{2 * c - c, -2 * s + s, -0.25};
+  for (int k = 0; k < 3; ++k) EXPECT_NEAR(bridge.measurement[k], expected[k], 1e-12) << k;
+  // The variance of the heading is the sum of two, a hundred times.
+  Eigen::Matrix3d information;
+  const auto& upper = bridge.information;
+  information << upper[0], upper[1], upper[2], upper[1], upper[3], upper[4], upper[2], upper[4],
+      upper[5];
+  EXPECT_NEAR(information.inverse()(2, 2), 100.0 * 0.02, 1e-9);
+  EXPECT_THAT(to_string(data.gaps), HasSubstr("no factor joins pose 1 to pose 2"));
+  EXPECT_THAT(to_string(data.gaps), HasSubstr("2 other measurements"));
+}
+
+TEST_F(PolicyRunTest, AGapWithoutAWayOrNotToBeBridgedIsRefused) {
+  EXPECT_THROW(policy_data(with_a_gap(registry_, false), {}, {}, Gaps::bridge), Error);
+  EXPECT_THROW(policy_data(with_a_gap(registry_, true)), Error);
+  // Poses before the first lead nowhere.
+  EXPECT_TRUE(policy_data(with_a_gap(registry_, true), {}, 2, Gaps::bridge).gaps.empty());
 }
 
 TEST_F(PolicyRunTest, RunsWithARegistrationOfTheCaller) {

@@ -21,12 +21,25 @@
 
 namespace cairn {
 
+/// Poses that follow each other by id in a recording, without a factor between them.
+struct OdometryGap {
+  Id before = 0, after = 0;
+  int measurements = 0;  ///< that lead from one to the other
+  int factor = 0;        ///< that stands for odometry: its position in the recording
+};
+/// A sentence without its full stop; empty where there are none.
+CAIRN_API std::string to_string(const std::vector<OdometryGap>& gaps);
+
+/// What to do about such gaps.
+enum class Gaps { refuse, bridge };
+
 /// What policies are run on: a recorded pose graph and, if it is known, the truth.
 struct PolicyData {
   Graph recording;
   std::optional<Graph> truth_graph;  ///< true states of the same variables, of the same types
   std::optional<Trajectory> truth;   ///< true poses, perhaps of other types
   std::vector<Arrival> poses;
+  std::vector<OdometryGap> gaps = {};            ///< that were bridged
   std::int64_t loops = 0;                        ///< factors between poses besides odometry
   std::int64_t priors = 0;                       ///< factors on one pose
   std::int64_t landmarks = 0, observations = 0;  ///< landmarks; factors on a pose and a landmark
@@ -34,9 +47,11 @@ struct PolicyData {
 
 /// Throws `Error` (input) as `pose_chain` does. A `truth` that lacks a pose of the recording, or
 /// has it with another type, gives errors of the trajectory only. With `begin`, the trajectory
-/// begins at the pose with this id: those before it are of earlier sessions.
+/// begins at the pose with this id: those before it are of earlier sessions. Where odometry is
+/// missing and other measurements lead from a pose to the next, `Gaps::bridge` adds a factor along
+/// the most certain way of these, ten times as uncertain, since they are used again.
 CAIRN_API PolicyData policy_data(Graph recording, std::optional<Graph> truth = {},
-                                 std::optional<Id> begin = {});
+                                 std::optional<Id> begin = {}, Gaps gaps = Gaps::refuse);
 
 /// A policy and a registration by name, with options.
 struct PolicyJob {
