@@ -372,11 +372,16 @@ void note_distance(const CompactOptions& options, const CompactOutcome& outcome,
   }
 }
 
-/// The strategy to begin with: `whole` by default, where it can be.
-std::string first_strategy(const CompactOptions& options, const Recording& recording,
-                           const PolicySetting& setting) {
+/// The strategy: `whole` by default, where it can be.
+std::string choose_strategy(const CompactOptions& options, const Recording& recording,
+                            const PolicySetting& setting) {
   if (!options.strategy.empty() && options.strategy != kWhole) return options.strategy;
   if (options.is_study) return "fpfl";
+  const ComponentSpec policy = parse_component(options.policy);
+  const bool has_strategies =
+      setting.registry.options(PosePolicy::kKind, policy.name).find("strategy") != nullptr;
+  if (options.strategy.empty() && (!has_strategies || policy.values.contains("strategy")))
+    return "fpfl";  // or its own
   const std::string why_not =
       recording.map
           ? "the trajectory continues a map (--map)"
@@ -386,6 +391,26 @@ std::string first_strategy(const CompactOptions& options, const Recording& recor
   throw Error(ErrorCode::usage, fmt::format("--strategy {}: {}", kWhole, why_not));
 }
 
+/// For the strategy `whole`: the estimate of all measurements, without those that contradict the
+/// others, which leave the recording. Nothing, and a note, where there is none.
+std::optional<EstimateOfAll> estimate_all(Recording& recording, const PolicySetting& setting,
+                                          const Session& session) {
+  StatusLine line(session.common.quiet);
+  if (line.on_terminal()) line.show("optimising all measurements");
+  EstimateOfAll all = estimate_of_all(setting);
+  line.clear();
+  if (!all.why_not.empty()) {
+    if (!setting.interrupted())
+      session.note(fmt::format("the map is that of --strategy fpfl: {}", all.why_not));
+    return std::nullopt;
+  }
+  if (const std::string words = left_out_in_words(all, recording.data); !words.empty()) {
+    session.note(words);
+    recording.data = without_factors(std::move(recording.data), all.left_out);
+  }
+  return all;
+}
+
 }  // namespace
 
 int run_compact(const CompactOptions& options, Session& session) {
@@ -393,7 +418,7 @@ int run_compact(const CompactOptions& options, Session& session) {
   session.use_threads();
   Registry& registry = session.registry();
   const ProblemSetup setup(options.problem, registry);
-  const Recording recording = load_recording(options, session);
+  Recording recording = load_recording(options, session);
   note_fixed_start(recording, session);
   note_lost_measurements(recording, options, session);
   const InterruptGuard guard;  // until the results are written
@@ -421,7 +446,13 @@ int run_compact(const CompactOptions& options, Session& session) {
     progress.clear();
     return run.finish(recovery);
   };
-  Job job = prepare(options, first_strategy(options, recording, setting), setting, session);
+  std::string strategy = choose_strategy(options, recording, setting);
+  std::optional<EstimateOfAll> all;
+  if (strategy == kWhole) {
+    all = estimate_all(recording, setting, session);
+    if (!all) strategy = "fpfl";
+  }
+  Job job = prepare(options, strategy, setting, session);
   if (guard.interrupted()) {
     progress.clear();
     session.note("interrupted before anything was selected");
@@ -431,18 +462,12 @@ int run_compact(const CompactOptions& options, Session& session) {
   std::optional<WholeMap> whole;
   if (job.is_whole()) {
     NodeProgress nodes(session.common.quiet);
-    whole = take_whole_map(job.job, setting, result,
+    whole = take_whole_map(job.job, setting, *all, result,
                            [&](const SparsifyProgress& at) { nodes.show(at); });
     if (!whole->why_not.empty()) {
-      // The policy's own map is the better, the more care its thresholds were found with.
       session.note(fmt::format("the map is that of --strategy fpfl: {}", whole->why_not));
       whole.reset();
-      if (guard.interrupted()) {
-        job.strategy = "fpfl";
-      } else {
-        job = prepare(options, "fpfl", setting, session);
-        result = run_job(job.job, nullptr);
-      }
+      job.strategy = "fpfl";
     }
   }
   results.write(options.save_thresholds, [&] {

@@ -227,9 +227,17 @@ def test_where_there_is_no_whole_map_it_says_why():
             cairn.compact(graph, strategy="whole", **arguments, **OPTIONS)
     with pytest.raises(cairn.Error, match="give one"):
         cairn.compact(graph, "compact_pose:strategy=apfl", strategy="whole", **OPTIONS)
-    wrong, _ = cairn.generate("manhattan", seed=3, poses=300, outliers=20)
+    wrong, _ = cairn.generate("manhattan", seed=3, poses=100, outliers=400)
     result = cairn.compact(wrong)
     assert result.strategy == "fpfl" and any("measurements contradict each other" in note for note in result.notes), result.notes
+
+
+def test_wrong_loop_closures_are_left_out():
+    right = cairn.compact(city()[0])
+    wrong = cairn.compact(cairn.generate("manhattan", seed=3, poses=300, outliers=20)[0])
+    assert any("20 of " in note and "are left out" in note for note in wrong.notes), wrong.notes
+    assert [wrong.counts[key] == right.counts[key] for key in ["kept", "loops", "kept_loops"]] == 3 * [True]
+    assert_allclose(wrong.trajectory.states(Pose2), right.trajectory.states(Pose2), atol=1e-6)
 
 
 # Live --------------------------------------------------------------------------------------------

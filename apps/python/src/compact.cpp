@@ -133,28 +133,45 @@ bool select(const Plan& plan, const PolicySetting& setting, Follower& follower, 
   return true;
 }
 
-/// The map of all measurements in the place of the policy's own; where there is none, that of the
-/// strategy fpfl, whose thresholds are found with more care.
-void make_whole(const Plan& plan, const PolicySetting& setting, Follower& follower, PolicyJob& job,
+/// The estimate of all measurements, without those that contradict the others, which leave the
+/// recording. Nothing, and a note, where there is none: the strategy is `fpfl` then.
+std::optional<EstimateOfAll> estimate_all(const PolicySetting& setting, BoundResult& out) {
+  EstimateOfAll all = estimate_of_all(setting);
+  if (!all.why_not.empty()) {
+    out.strategy = "fpfl";
+    if (!setting.interrupted())
+      out.notes.push_back(fmt::format("the map is that of strategy fpfl: {}", all.why_not));
+    return std::nullopt;
+  }
+  if (std::string words = left_out_in_words(all, out.data); !words.empty()) {
+    out.notes.push_back(std::move(words));
+    out.data = without_factors(std::move(out.data), all.left_out);
+  }
+  return all;
+}
+
+/// Their map in the place of the policy's own.
+void make_whole(const PolicySetting& setting, const PolicyJob& job, const EstimateOfAll& all,
                 BoundResult& out) {
-  WholeMap whole = take_whole_map(job, setting, out.result);
-  if (whole.why_not.empty()) {
-    out.notes.insert(out.notes.end(), whole.notes.begin(), whole.notes.end());
-    out.check = whole.check;
-    out.whole = std::move(whole);
+  WholeMap whole = take_whole_map(job, setting, all, out.result);
+  if (!whole.why_not.empty()) {
+    out.strategy = "fpfl";
+    out.notes.push_back(fmt::format("the map is that of strategy fpfl: {}", whole.why_not));
     return;
   }
-  out.strategy = "fpfl";
-  out.notes.push_back(fmt::format("the map is that of strategy fpfl: {}", whole.why_not));
-  if (!setting.interrupted()) select(plan, setting, follower, job, out);
+  out.notes.insert(out.notes.end(), whole.notes.begin(), whole.notes.end());
+  out.check = whole.check;
+  out.whole = std::move(whole);
 }
 
 /// Without the interpreter's lock.
 void run(const Plan& plan, const PolicySetting& setting, Follower& follower, BoundResult& out) {
   PolicyJob job;
   out.strategy = strategy_of(plan, setting);
+  std::optional<EstimateOfAll> all;
+  if (out.strategy == kWhole) all = estimate_all(setting, out);
   if (!select(plan, setting, follower, job, out)) return;
-  if (out.strategy == kWhole) make_whole(plan, setting, follower, job, out);
+  if (all) make_whole(setting, job, *all, out);
   if (!out.whole) out.check = check_map(job, out.result, setting);
   if (out.whole) {
     if (out.whole->advice) out.notes.push_back(to_string(*out.whole->advice));

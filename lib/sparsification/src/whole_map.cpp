@@ -80,14 +80,15 @@ std::string why_no_whole_map(const PolicyJob& job, const PolicySetting& setting)
   return {};
 }
 
-WholeMap take_whole_map(const PolicyJob& job, const PolicySetting& setting, PolicyResult& result,
+WholeMap take_whole_map(const PolicyJob& job, const PolicySetting& setting,
+                        const EstimateOfAll& all, PolicyResult& result,
                         const std::function<void(const SparsifyProgress&)>& progress) {
   const auto begin = std::chrono::steady_clock::now();
-  WholeMap map{.why_not = why_no_whole_map(job, setting)};
-  if (!map.why_not.empty()) return map;
-  const EstimateOfAll all = estimate_of_all(job, result, setting);
-  map.why_not = all.why_not;
-  if (!map.why_not.empty()) return map;
+  WholeMap map;
+  if (result.interrupted) {
+    map.why_not = "the run was interrupted";
+    return map;
+  }
   SparsifyResult sparse = take_out(all.graph, setting, result, progress);
   if (sparse.interrupted) {
     map.why_not = "it was interrupted before the map of all measurements was made";

@@ -32,6 +32,7 @@ RejectedFactors rejected_factors(const Graph& graph) {
     double weight = 1.0;
     loss->evaluate({&norms[f], 1}, {}, {&weight, 1});
     const bool rejected = weight < kRejected;
+    if (rejected) result.positions.push_back(f);
     ++(loops[f] ? result.loops : result.others);
     (loops[f] ? result.rejected_loops : result.rejected_others) += rejected;
   }

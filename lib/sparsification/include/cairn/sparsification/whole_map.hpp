@@ -32,18 +32,18 @@ struct WholeMap {
   std::vector<std::string> notes = {};
 };
 
-/// Why a run of `job` cannot end in such a map, before it has begun: matches are not those of the
+/// Why a run of `job` cannot end in such a map, whatever is measured: matches are not those of the
 /// recording (`matches_as_recorded`), or the recording has landmarks. Empty: it can.
 CAIRN_API std::string why_no_whole_map(const PolicyJob& job, const PolicySetting& setting);
 
-/// Replaces what a run has found by what all measurements say: optimises the recording, from the
-/// trajectory of the run (`estimate_of_all`), and takes the poses that the policy has not kept out
-/// of it, by factors that stand for theirs (`sparsify_whole`). The compact graph of `result` is
-/// then what is left, at its minimum; the trajectory is the estimate of all measurements; chi2 is
-/// that of all measurements, of which all are kept; errors are under the name "whole". Nothing is
-/// replaced where `why_not` says why. `progress` may be empty.
-CAIRN_API WholeMap
-take_whole_map(const PolicyJob& job, const PolicySetting& setting, PolicyResult& result,
-               const std::function<void(const SparsifyProgress&)>& progress = {});
+/// Replaces what a run has found by what all measurements say: takes the poses that the policy has
+/// not kept out of their estimate, by factors that stand for theirs (`sparsify_whole`). The compact
+/// graph of `result` is then what is left, at its minimum; the trajectory is the estimate of all
+/// measurements; chi2 is that of all measurements, of which all are kept; errors are under the name
+/// "whole". Nothing is replaced where `why_not` says why. `all` is of the same recording
+/// (`estimate_of_all`), without what it leaves out (`without_factors`). `progress` may be empty.
+CAIRN_API WholeMap take_whole_map(
+    const PolicyJob& job, const PolicySetting& setting, const EstimateOfAll& all,
+    PolicyResult& result, const std::function<void(const SparsifyProgress&)>& progress = {});
 
 }  // namespace cairn

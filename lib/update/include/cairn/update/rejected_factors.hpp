@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "cairn/graph/graph.hpp"
 #include "cairn/runtime/api.hpp"
@@ -15,6 +16,7 @@ namespace cairn {
 struct RejectedFactors {
   std::int64_t loops = 0, rejected_loops = 0;    ///< loop closures with a loss; those of them
   std::int64_t others = 0, rejected_others = 0;  ///< other factors with a loss; those of them
+  std::vector<int> positions = {};               ///< of all that are rejected, rising
   /// Nearly all loop closures (nine in ten or more, three at least): what is left is dead
   /// reckoning, and contradicts nothing.
   bool nearly_all_loops() const { return rejected_loops >= 3 && 10 * rejected_loops >= 9 * loops; }
