@@ -65,6 +65,7 @@ SparsifyJob job_of(const SparsifyCommandOptions& options, Session& session) {
   job.estimator = options.estimator;
   job.online = options.online;
   job.as_given = options.as_given;
+  job.keep_minimum = !options.is_study;
   const bool beforehand = options.redirect == "beforehand";
   if (options.redirect != "late") {
     if (options.keep_every == 0 || options.online == 0) {

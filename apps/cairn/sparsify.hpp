@@ -27,6 +27,7 @@ struct SparsifyCommandOptions {
   InputOptions input;
   ProblemOptions problem;
   // Of studies:
+  bool is_study = false;  ///< new factors measure their blanket's own minimum, as in the thesis
   std::string redirect = "late", redirect_to;
   bool newer = false;
   double inflation = RedirectionRule{}.inflation;

@@ -65,6 +65,7 @@ Command add_study_compact(ArgumentParser study) {
 
 Command add_study_sparsify(ArgumentParser study) {
   auto options = std::make_shared<SparsifyCommandOptions>();
+  options->is_study = true;
   ArgumentParser cli = study.add_command(
       "sparsify", "cairn sparsify as in the thesis, and with its problems recorded");
   add_sparsify_options(cli, *options);

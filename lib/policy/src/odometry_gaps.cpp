@@ -20,7 +20,7 @@ constexpr double kLooser = 10.0;  // standard deviations
 /// The measurements between poses, as ways from each to the others.
 class Ways {
  public:
-  Ways(const Graph& graph, std::optional<Id> begin) : graph_(graph), from_(graph.variable_count()) {
+  Ways(const Graph& graph, std::optional<Id> begin) : from_(graph.variable_count()) {
     for (int f = 0; f < graph.factor_count(); ++f) {
       const auto on = graph.factor_variables(f);
       if (on.size() != 2 || !graph.factor_type(f).is_relative()) continue;
@@ -76,7 +76,6 @@ class Ways {
     int to, factor;
     double length;
   };
-  const Graph& graph_;
   std::vector<std::vector<Edge>> from_;
 };
 

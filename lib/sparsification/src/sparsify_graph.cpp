@@ -19,6 +19,7 @@
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/timed.hpp"
 #include "cairn/solve/estimator.hpp"
+#include "kept_minimum.hpp"
 #include "plain_loss.hpp"
 #include "whole_graph.hpp"
 
@@ -171,6 +172,10 @@ SparsifyResult sparsify_whole(const Graph& graph, const SparsifyJob& job,
   result.change = take_out(original, nodes, parts, setting);
   add_notes(result);
   result.interrupted = setting.interrupted();
+  if (job.keep_minimum && result.converged && !result.interrupted) {
+    keep_minimum(original, result.change,
+                 [&] { return setting.registry.make<LinearSolver>(job.linear_solver); });
+  }
   result.sparse = original.clone();
   apply(result.change, result.sparse);
   if (result.interrupted) return result;

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <set>
 #include <string>
 #include <vector>
@@ -103,33 +104,85 @@ TEST_F(SparsifyGraph, OneOfEveryFewStaysFromTheFirstOnWhetherItIsFixedOrNot) {
 /// The estimate does not depend on the scale of the information, and nor does what is left of it.
 TEST_F(SparsifyGraph, IsTheSameAtAnyScaleOfTheInformation) {
   const Graph graph = simulate("manhattan:poses=120,streets=3");
-  const SparsifyResult as_it_is = sparsify_whole(graph, job("smallest_blanket:part=0.5"), setting_);
-  ASSERT_TRUE(as_it_is.error.has_value());
-  for (const double scale : {1e-12, 1e-6, 1e6, 1e12}) {
-    Graph scaled = graph.clone();
-    for (int f = 0; f < graph.factor_count(); ++f) {
-      std::vector<double> information(graph.information(f).begin(), graph.information(f).end());
-      for (double& entry : information) entry *= scale;
-      scaled.set_measurement(f, graph.measurement(f), information);
-    }
-    const SparsifyResult result =
-        sparsify_whole(scaled, job("smallest_blanket:part=0.5"), setting_);
-    ASSERT_EQ(ids(result.sparse), ids(as_it_is.sparse)) << scale;
-    ASSERT_TRUE(result.error.has_value()) << scale;
-    // The divergence of the means is in units of the information; that of the covariances has none.
-    const double of_covariances = as_it_is.error->kld - as_it_is.error->mean;
-    EXPECT_NEAR(result.error->mean, scale * as_it_is.error->mean, 1e-4 * result.error->mean)
-        << scale;
-    if (scale <= 1.0) {
-      EXPECT_NEAR(result.error->kld - result.error->mean, of_covariances, 1e-4 * of_covariances)
+  for (const bool keep : {false, true}) {
+    SparsifyJob half = job("smallest_blanket:part=0.5");
+    half.keep_minimum = keep;
+    const SparsifyResult as_it_is = sparsify_whole(graph, half, setting_);
+    ASSERT_TRUE(as_it_is.error.has_value());
+    for (const double scale : {1e-12, 1e-6, 1e6, 1e12}) {
+      Graph scaled = graph.clone();
+      for (int f = 0; f < graph.factor_count(); ++f) {
+        std::vector<double> information(graph.information(f).begin(), graph.information(f).end());
+        for (double& entry : information) entry *= scale;
+        scaled.set_measurement(f, graph.measurement(f), information);
+      }
+      const SparsifyResult result = sparsify_whole(scaled, half, setting_);
+      ASSERT_EQ(ids(result.sparse), ids(as_it_is.sparse)) << scale;
+      ASSERT_TRUE(result.error.has_value()) << scale;
+      // The divergence of the means is in units of the information; that of the covariances has
+      // none.
+      const double of_covariances = as_it_is.error->kld - as_it_is.error->mean;
+      EXPECT_NEAR(result.error->mean, scale * as_it_is.error->mean,
+                  1e-4 * result.error->mean + (keep ? 1e-9 * scale : 0.0))
           << scale;
-    }
-    EXPECT_NEAR(result.error->rmse, as_it_is.error->rmse, 1e-5) << scale;
-    for (int v = 0; v < result.sparse.variable_count(); ++v) {
-      const auto x = result.sparse.state(v), expected = as_it_is.sparse.state(v);
-      for (std::size_t k = 0; k < x.size(); ++k) EXPECT_NEAR(x[k], expected[k], 1e-5) << scale;
+      if (scale <= 1.0) {
+        EXPECT_NEAR(result.error->kld - result.error->mean, of_covariances, 1e-4 * of_covariances)
+            << scale;
+      }
+      EXPECT_NEAR(result.error->rmse, as_it_is.error->rmse, 1e-5) << scale;
+      for (int v = 0; v < result.sparse.variable_count(); ++v) {
+        const auto x = result.sparse.state(v), expected = as_it_is.sparse.state(v);
+        for (std::size_t k = 0; k < x.size(); ++k) EXPECT_NEAR(x[k], expected[k], 1e-5) << scale;
+      }
     }
   }
+}
+
+/// What the new factors measure is changed for that, by less than the standard deviation of most.
+TEST_F(SparsifyGraph, TheMinimumStaysWhereItIs) {
+  constexpr double kTurn = 2.0 * std::numbers::pi;
+  for (const char* world : {"manhattan:poses=300,streets=4", "ellipse3d:poses=150"}) {
+    for (const char* sparsifier :
+         {"sparsify", "sparsify:topology=clt", "sparsify:topology=cliquey,recovery=closed_form"}) {
+      const Graph graph = simulate(world);
+      SparsifyJob some = job("smallest_blanket:part=0.7");
+      some.sparsifier = parse_component(sparsifier);
+      some.keep_minimum = false;
+      const SparsifyResult moved = sparsify_whole(graph, some, setting_);
+      some.keep_minimum = true;
+      const SparsifyResult kept = sparsify_whole(graph, some, setting_);
+      ASSERT_TRUE(moved.error && kept.error) << world << ' ' << sparsifier;
+      EXPECT_GT(moved.error->rmse, 1e-4) << world << ' ' << sparsifier;
+      EXPECT_LT(kept.error->rmse, 1e-6) << world << ' ' << sparsifier;
+      EXPECT_LT(kept.error->mean, 1e-6) << world << ' ' << sparsifier;
+      EXPECT_LT(kept.error->kld, moved.error->kld) << world << ' ' << sparsifier;
+      EXPECT_EQ(ids(kept.sparse), ids(moved.sparse));
+      ASSERT_EQ(kept.change.factors.size(), moved.change.factors.size());
+      double change = 0.0;
+      for (std::size_t k = 0; k < kept.change.factors.size(); ++k) {
+        const Factor &a = kept.change.factors[k], &b = moved.change.factors[k];
+        EXPECT_EQ(a.variables, b.variables);
+        EXPECT_EQ(a.information, b.information);
+        for (std::size_t i = 0; i < a.measurement.size(); ++i)
+          change = std::max(change,
+                            std::abs(std::remainder(a.measurement[i] - b.measurement[i], kTurn)));
+      }
+      EXPECT_GT(change, 0.0);
+      EXPECT_LT(change, 0.3) << world << ' ' << sparsifier;
+    }
+  }
+}
+
+/// Landmarks and priors that are added stay as they are, and the rest is balanced beside them.
+TEST_F(SparsifyGraph, OtherFactorsThanRelativePosesStay) {
+  const Graph graph = simulate("landmarks2d:poses=60");
+  SparsifyJob some = job("smallest_blanket:part=0.4");
+  some.keep_minimum = false;
+  const SparsifyResult moved = sparsify_whole(graph, some, setting_);
+  some.keep_minimum = true;
+  const SparsifyResult kept = sparsify_whole(graph, some, setting_);
+  ASSERT_TRUE(moved.error && kept.error);
+  EXPECT_LE(kept.error->kld, moved.error->kld + 1e-6);
 }
 
 TEST_F(SparsifyGraph, LosesSomethingWhereLoopsMeet) {

@@ -29,6 +29,9 @@ class CAIRN_API CorrelatedPair final : public EvaluatedFactorType, public NeverT
   CorrelatedPair(std::shared_ptr<const FactorType> relative, std::array<int, 2> first,
                  std::array<int, 2> second);
 
+  /// Which two of its variables each measurement is between.
+  const std::array<std::array<int, 2>, 2>& between() const { return between_; }
+
   std::string_view tag() const override { return kTag; }
   int arity() const override { return 3; }
   std::span<const std::string_view> variable_tags() const override { return tags_; }
