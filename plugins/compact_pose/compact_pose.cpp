@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <set>
 #include <utility>
 
 #include <fmt/core.h>
@@ -25,6 +26,10 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kAhead = 2.0;
 /// Links that wait: older ones are given up when there are more.
 constexpr std::size_t kMostWaiting = 32;
+/// Refused matches that are remembered, and of how many other poses some have to agree with one of
+/// them to doubt odometry.
+constexpr std::size_t kMostRefused = 32;
+constexpr std::size_t kAgreeing = 3;
 
 /// What a measurement of a landmark must add to be used, and what may be lost where a pose leaves
 /// that landmarks locate, by default [nats per DoF of a pose].
@@ -182,6 +187,7 @@ void CompactPose::add_pose(const Variable& pose, std::span<const Factor> odometr
     std::swap(report_, report);
     const Timed timed(report_.seconds.total);
     odometry_ = to_matrix(motion.covariance, graph_.group().tangent_size());
+    follow_refused(motion);
     graph_.advance(pose, motion, odometry.front().type);
     if (pose.fixed) graph_.keep(report_.seconds);
   }
@@ -420,9 +426,54 @@ LinkVerdict CompactPose::judge(const Link& link, LinkReport& report) {
   const Fit fit = check_->fit(link, d);
   report.innovation = fit.innovation;
   if (!(report.gain > loop_gain_)) return LinkVerdict::uninformative;
-  if (!fit.consistent) return LinkVerdict::inconsistent;
+  if (!fit.consistent)
+    return doubts_odometry(link, d) ? LinkVerdict::linked : LinkVerdict::inconsistent;
   if (check_->needs_another(fit) && !agrees_with_waiting(link)) return LinkVerdict::waiting;
   return LinkVerdict::linked;
+}
+
+void CompactPose::follow_refused(const Motion& motion) {
+  const RigidGroup& group = graph_.group();
+  const State step = group.state(motion.mean);
+  const Matrix A = group.adjoint(group.inverse(step));
+  for (Refused& refused : refused_) {
+    refused.since.mean = group.compose(refused.since.mean, step);
+    refused.since.covariance = A * refused.since.covariance * A.transpose() + odometry_;
+  }
+}
+
+/// Of a link that the gate refuses. Where three of other poses that it has refused before agree
+/// with it, each closing a cycle with the odometry between their ends, it is the estimate that is
+/// wrong: odometry is less certain than its covariances say, as where a wheel's radius is. False
+/// matches that agree so with each other are one place that looks like another.
+bool CompactPose::doubts_odometry(const Link& link, const Displacement& expected) {
+  const Id earlier = graph_.id(link.earlier);
+  std::set<Id> agree;
+  for (const Refused& other : refused_) {
+    const int pose = graph_.find(other.earlier);
+    if (pose < 0 || other.later == graph_.newest_id()) continue;
+    const Fit fit =
+        check_->agreement(other.link, link, graph_.between(pose, link.earlier), other.since);
+    if (fit.consistent && !check_->needs_another(fit)) agree.insert(other.later);
+  }
+  if (agree.size() < kAgreeing || !check_->on()) {
+    Refused refused{earlier, graph_.newest_id(), link, expected};
+    refused.since.mean = graph_.group().between(link.mean, link.mean);
+    refused.since.covariance.setZero();
+    refused_.push_back(std::move(refused));
+    if (refused_.size() > kMostRefused) refused_.pop_front();
+    return false;
+  }
+  const double loose = check_->loosen_for(link, expected);
+  if (!check_->fit(link, expected).consistent) return false;
+  report_.notes.push_back(fmt::format(
+      "matches of {} poses that the gate refused agree with that of poses {} and {}: odometry is "
+      "less "
+      "certain than its covariances say, and the gate takes standard deviations as {:.3g} times "
+      "larger from now on",
+      agree.size(), earlier, graph_.newest_id(), std::sqrt(loose)));
+  refused_.clear();
+  return true;
 }
 
 bool CompactPose::agrees_with_waiting(const Link& link) {

@@ -98,6 +98,13 @@ class CompactPose final : public PosePolicy, public OptionFinder {
     LinkReport report;
   };
 
+  /// A link that the gate has refused, and how the robot has moved since its later pose.
+  struct Refused {
+    Id earlier = 0, later = 0;
+    Link link;
+    Displacement since;
+  };
+
   /// What was learnt from a link that may be revoked.
   struct Learnt {
     Id earlier = 0, later = 0;
@@ -162,6 +169,8 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   void use(const Link& link);
   LinkVerdict judge(const Link& link, LinkReport& report);
   void judge_waiting();
+  void follow_refused(const Motion& motion);
+  bool doubts_odometry(const Link& link, const Displacement& expected);
   bool agrees_with_waiting(const Link& link);
   LinkVerdict judge_prior(const MeasuredFit& fit, PriorReport& report) const;
   FrameEstimate frame();
@@ -230,6 +239,7 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   std::vector<Dimensions> dimensions_;  ///< of the candidates, before any link of this pose
 
   std::vector<Waiting> waiting_;
+  std::deque<Refused> refused_;  ///< the latest
   std::vector<WaitingPrior> waiting_priors_;
   std::map<Id, WaitingLandmark> waiting_landmarks_;
   int nonlinear_poses_ = 0;  ///< in a row, of which no measurement of a landmark was linear

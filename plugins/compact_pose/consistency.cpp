@@ -37,7 +37,15 @@ Fit ConsistencyCheck::judge(const Vector& e, const Matrix& S) const {
 
 Fit ConsistencyCheck::fit(const Link& link, const Displacement& expected) const {
   const Vector e = group_.log(group_.between(expected.mean, link.mean));
-  return judge(e, expected.covariance + link.covariance);
+  return judge(e, loose_ * expected.covariance + link.covariance);
+}
+
+double ConsistencyCheck::loosen_for(const Link& link, const Displacement& expected) {
+  constexpr double kMost = 1e6;
+  const double before = loose_;
+  while (loose_ < kMost && !fit(link, expected).consistent) loose_ *= 2.0;
+  if (!fit(link, expected).consistent) loose_ = before;
+  return loose_;
 }
 
 bool ConsistencyCheck::passes(double innovation, int dof) const {

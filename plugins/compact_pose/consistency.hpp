@@ -43,6 +43,9 @@ class ConsistencyCheck {
   ConsistencyCheck(const RigidGroup& group, const SensorRange& range, double gate, double trust);
 
   bool on() const { return limit_ > 0.0; }
+  /// Takes the displacements that are expected as less certain from now on, Σ_d times the least
+  /// power of two with which this link fits; returns by how much in all. None fits with any: one.
+  double loosen_for(const Link& link, const Displacement& expected);
   /// Of a link with the displacement that was expected.
   Fit fit(const Link& link, const Displacement& expected) const;
   /// Whether two links close a cycle. `earlier` is the displacement from the first's earlier pose
@@ -61,6 +64,7 @@ class ConsistencyCheck {
   double limit_ = 0.0;       ///< χ² quantile of the gate
   double log_volume_ = 0.0;  ///< ln of the ellipsoid's volume for S = I over the range's
   double gate_, trust_;
+  double loose_ = 1.0;  ///< times Σ_d
 };
 
 }  // namespace cairn::compact

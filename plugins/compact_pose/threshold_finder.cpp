@@ -21,7 +21,7 @@ constexpr std::size_t kLatest = 31;
 /// Of them this part is better.
 constexpr double kBetter = 0.25;
 /// So many poses that were not matched for what is expected of a match call it into question.
-constexpr int kSilence = 10;
+constexpr int kSilence = 8;
 /// Logarithms of determinants that differ by less are the same.
 constexpr double kSameSize = 0.01;
 

@@ -174,17 +174,17 @@ TEST(TypicalMatch, IsForgottenWhereItSilences) {
   const auto silence = [&](int poses) {
     for (int k = 0; k < poses; ++k) typical.note_silence();
   };
-  silence(9);
+  silence(7);
   typical.note(sized(5.0));  // a match: the silence is over
-  silence(9);
+  silence(7);
   EXPECT_EQ(typical.covariance()(0, 0), 2.0);
   silence(1);  // 1 and 2 are left
   EXPECT_EQ(typical.covariance()(0, 0), 1.0);
-  silence(10);
+  silence(8);
   EXPECT_TRUE(typical.known());
-  silence(10);
+  silence(8);
   EXPECT_FALSE(typical.known());
-  silence(10);
+  silence(8);
   typical.note(sized(7.0));
   EXPECT_EQ(typical.covariance()(0, 0), 7.0);
 }
