@@ -52,6 +52,7 @@ struct ExploreOptions {
   double decision_budget = std::numeric_limits<double>::infinity();  // [s]
   ComparisonOptions comparison;
   std::uint64_t seed = 1;
+  bool no_consecutive = false;
   std::optional<double> start_x, start_y, start_theta;
   std::string output, trajectory, truth, map, steps, log, loss;
   RunRecordingOptions recording;
@@ -299,7 +300,8 @@ int compare_explorers(const ExploreOptions& options, Session& session) {
                                .limits = limits,
                                .match = match,
                                .decision_budget = options.decision_budget,
-                               .loop_loss = loss};
+                               .loop_loss = loss,
+                               .match_consecutive = !options.no_consecutive};
   return run_comparison(options.comparison, options.recording.page, setup, options.floor, parts,
                         session);
 }
@@ -348,7 +350,7 @@ int run_explore(const ExploreOptions& options, Session& session) {
       .interrupt = &guard.flag(),
       .decided = [&](const Decision& decision, const Situation&) { progress.decided(decision); },
       .moved = [&](const ExplorationStep& step, const FloorMap& map) { progress.moved(step, map); },
-      .match_consecutive = is_recorded,
+      .match_consecutive = !options.no_consecutive,
       .loop_loss = loss,
       .log = options.log.empty() ? nullptr : &log};
   if (floor) exploration.reachable = floor->reachable;
@@ -407,6 +409,8 @@ Command add_explore(ArgumentParser program) {
   cli.add_option("--match", options->match,
                  "loop closures as explorers expect them: range=1,angle=0.35,sigma_xy=0.05")
       .type_name("K=V,…");
+  cli.add_flag("--no-consecutive", options->no_consecutive,
+               "match no scan with the one before: odometry alone leads from one to the next");
   cli.add_option("--lidar", options->lidar, "options of the lidar: fov=180,range=8,beams=181")
       .type_name("K=V,…");
   cli.add_option("--odometry", options->odometry, "its noise: relative=0.15,sigma_xy=0.01")

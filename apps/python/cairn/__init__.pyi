@@ -854,6 +854,7 @@ def explore(
     match_range: Optional[float] = ...,
     match_angle: Optional[float] = ...,
     decision_budget: Optional[float] = ...,
+    match_consecutive: bool = ...,
     callback: Optional[Callable[[ExplorationStep], Optional[bool]]] = ...,
     **options: _OptionValue,
 ) -> ExplorationResult: ...

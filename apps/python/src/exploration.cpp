@@ -112,7 +112,8 @@ std::unique_ptr<BoundExploration> explore(
     std::optional<int> max_steps, std::optional<int> max_decisions, const std::string& world,
     const std::string& policy, const std::string& registration, const std::string& mapper,
     std::optional<double> match_range, std::optional<double> match_angle,
-    std::optional<double> decision_budget, const py::object& callback, const py::kwargs& options) {
+    std::optional<double> decision_budget, bool match_consecutive, const py::object& callback,
+    const py::kwargs& options) {
   const OccupancyGrid floor = floor_of(given_floor);
   const InterruptGuard guard;
   Follower follower(callback, guard.flag());
@@ -125,7 +126,8 @@ std::unique_ptr<BoundExploration> explore(
                          .floor = floor,
                          .start = start,
                          .limits = limits_of({max_distance, max_steps, max_decisions}),
-                         .interrupt = &follower.stop()};
+                         .interrupt = &follower.stop(),
+                         .match_consecutive = match_consecutive};
   refuse_recorded(setup.world, setup.registry);
   const std::vector<std::uint8_t> reachable = reachable_floor(setup);
   setup.reachable = reachable;
@@ -282,7 +284,8 @@ void bind_exploration(py::module_& module) {
       py::arg("world") = ExplorationSetup::kWorld, py::arg("policy") = ExplorationSetup::kPolicy,
       py::arg("registration") = "icp", py::arg("mapper") = "log_odds",
       py::arg("match_range") = py::none(), py::arg("match_angle") = py::none(),
-      py::arg("decision_budget") = py::none(), py::arg("callback") = py::none(),
+      py::arg("decision_budget") = py::none(), py::arg("match_consecutive") = true,
+      py::arg("callback") = py::none(),
       R"(A simulated robot with a lidar explores a floor, and decides by itself where to drive (docs/explore.md).
 
 floor: a Floor to drive on, the name of a file of one, as of `read_floor`, or "@rooms", a floor plan with its options.
@@ -296,6 +299,7 @@ world, policy, registration, mapper: the robot, and what makes a graph and a map
     world="lidar_building:range=8,fov=180".
 match_range [m], match_angle [rad]: within which the explorer expects loop closures.
 decision_budget: within which explorers decide [s], as far as they can; then no run is like the other.
+match_consecutive: whether each scan is matched with the one before, which corrects odometry.
 callback: called with an ExplorationStep after each motion; when it returns False, the run ends.
 
 What an explorer of your own raises is raised here. Ctrl-C ends the run too, with the map so far. The interpreter's lock is released meanwhile.)");

@@ -165,6 +165,7 @@ ExplorationResult run_exploration(const ExplorationSetup& setup, Explorer& explo
                   .interrupt = setup.interrupt,
                   .decided = hooks.decided,
                   .moved = hooks.moved,
+                  .match_consecutive = setup.match_consecutive,
                   .loop_loss = setup.loop_loss});
 }
 

@@ -63,17 +63,19 @@ void ScanSlam::begin(const Pose2& at, LaserScan scan, const OdometryModel& odome
     parts_.policy.estimator().set_loss(parts_.loop_loss, FactorSelector::loops());
   Variable first = make_variable(0, at, parts_.registry);
   first.fixed = true;
+  if (truth) truth_.add(make_variable(first.id, *truth, parts_.registry));
   if (scans_to_) scans_to_->take(first.id, scan);
-  take(first, {}, std::move(scan), truth);
+  take(first, {}, std::move(scan));
 }
 
 void ScanSlam::add(const Pose2& odometry, const Eigen::Matrix3d& covariance, LaserScan scan,
                    const std::optional<Pose2>& truth) {
   const auto id = static_cast<Id>(scans_.size());
   check_scan(scan, fmt::format("scan {}", id));
+  if (truth) truth_.add(make_variable(id, *truth, parts_.registry));
   if (scans_to_) scans_to_->take(id, scan);
   take(make_variable<Pose2>(id, parts_.registry), matched_odometry(id, odometry, covariance),
-       std::move(scan), truth);
+       std::move(scan));
 }
 
 /// The motion to a pose whose scan the registration has.
@@ -102,9 +104,7 @@ std::vector<Factor> ScanSlam::matched_odometry(Id id, const Pose2& odometry,
   return {factor(match, noise + apart * apart.transpose())};
 }
 
-void ScanSlam::take(const Variable& pose, std::span<const Factor> odometry, LaserScan scan,
-                    const std::optional<Pose2>& truth) {
-  if (truth) truth_.add(make_variable(pose.id, *truth, parts_.registry));
+void ScanSlam::take(const Variable& pose, std::span<const Factor> odometry, LaserScan scan) {
   scans_.push_back(scan);
   const auto began = std::chrono::steady_clock::now();
   const PoseReport report = process_pose(pose, odometry, parts_.policy, parts_.registration);

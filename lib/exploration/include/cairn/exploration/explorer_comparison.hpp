@@ -42,6 +42,7 @@ struct ExplorationSetup {
   double sample_distance = kSampleDistance;                          ///< see `Exploration` [m]
   const std::atomic<bool>* interrupt = nullptr;
   std::shared_ptr<const Loss> loop_loss = nullptr;  ///< see `Exploration`; runs share it
+  bool match_consecutive = true;                    ///< see `Exploration`
 };
 
 /// What a caller wants to see of a run while it goes on; see `Exploration`.

@@ -81,8 +81,7 @@ class CAIRN_API ScanSlam {
   const Graph& truth() const { return truth_; }
 
  private:
-  void take(const Variable& pose, std::span<const Factor> odometry, LaserScan scan,
-            const std::optional<Pose2>& truth);
+  void take(const Variable& pose, std::span<const Factor> odometry, LaserScan scan);
   std::vector<Factor> matched_odometry(Id id, const Pose2& odometry,
                                        const Eigen::Matrix3d& covariance);
   void count(const PoseReport& report);
