@@ -406,7 +406,7 @@ std::optional<EstimateOfAll> estimate_all(Recording& recording, const PolicySett
   }
   if (const std::string words = left_out_in_words(all, recording.data); !words.empty()) {
     session.note(words);
-    recording.data = without_factors(std::move(recording.data), all.left_out);
+    recording.data = without_contradictions(std::move(recording.data), all);
   }
   return all;
 }
@@ -482,6 +482,10 @@ int run_compact(const CompactOptions& options, Session& session) {
                          .result = std::move(result),
                          .control = {},
                          .whole = std::move(whole)};
+  if (all) {
+    outcome.left_out = all->left_out_on;
+    outcome.loops_left_out = all->loops_left_out;
+  }
   if (options.strategy == "rfpfl") {
     PolicyJob random = job.job;
     random.policy = {"random_poses",

@@ -122,10 +122,14 @@ std::string errors_text(const TrajectoryError& e) {
       e.rpe_all_rotation);
 }
 
-std::string loops_text(const PolicyResult& result, const PolicyData& data, bool whole) {
+std::string loops_text(const PolicyResult& result, const PolicyData& data, bool whole,
+                       int left_out) {
   const std::string matched =
       fmt::format("{} pairs matched, {} of them well", result.proposed, result.registered);
-  if (whole) return fmt::format("all {} used; for the choice of poses {}", data.loops, matched);
+  if (whole) {
+    return fmt::format("{} used{}; for the choice of poses {}", data.loops,
+                       left_out > 0 ? fmt::format(", {} left out", left_out) : "", matched);
+  }
   return fmt::format("{} kept ({} of {} recorded); {}", result.kept_loops,
                      percent(result.kept_loops, data.loops), data.loops, matched);
 }
@@ -141,7 +145,8 @@ void add_result(Table& table, const CompactOutcome& outcome) {
        fmt::format("{} of {} kept ({})", kept, in, percent(kept, in)) +
            (result.map_poses > 0 ? fmt::format(", beside {} of the map", result.map_poses) : "")});
   if (data.loops > 0 || result.registered > 0)
-    table.add({"loops", loops_text(result, data, outcome.whole.has_value())});
+    table.add(
+        {"loops", loops_text(result, data, outcome.whole.has_value(), outcome.loops_left_out)});
   if (outcome.whole) {
     table.add({"factors", fmt::format("{} for {}, KLD {:.3g} nats", outcome.whole->factors_out,
                                       outcome.whole->factors_in, outcome.whole->kld)});
@@ -201,6 +206,7 @@ json::object report_json(const CompactOptions& options, const CompactOutcome& ou
                                                  : "max_iterations";
   report["thresholds"] = thresholds_json(outcome.thresholds, outcome.found);
   for (auto& [name, value] : result_json(outcome.shown(), outcome.data)) report[name] = value;
+  report["loops"].as_object()["in"] = outcome.data.loops + outcome.loops_left_out;
   if (outcome.control) report["like"] = result_json(outcome.result, outcome.data);
   if (outcome.check) {
     report["check"] = {{"distance", outcome.check->distance}, {"extent", outcome.check->extent}};
@@ -214,6 +220,10 @@ json::object report_json(const CompactOptions& options, const CompactOutcome& ou
   } else {
     report["whole"] = nullptr;
   }
+  json::array left_out;
+  for (const std::vector<Id>& on : outcome.left_out)
+    left_out.emplace_back(json::array(on.begin(), on.end()));
+  report["left_out"] = std::move(left_out);
   report["recovery"] = options.recovery;
   report["map"] = text_json(options.map);
   report["located"] = outcome.result.located;

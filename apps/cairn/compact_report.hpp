@@ -28,7 +28,10 @@ struct CompactOutcome {
   PolicyResult result;
   std::optional<PolicyResult> control;  ///< as many poses and loops at random
   std::optional<WholeMap> whole = {};   ///< `result` is of all measurements
-  std::optional<MapCheck> check = {};   ///< of what is shown
+  /// Those that contradict the others and have left the recording: the ids of each.
+  std::vector<std::vector<Id>> left_out = {};
+  int loops_left_out = 0;              ///< loop closures among them
+  std::optional<MapCheck> check = {};  ///< of what is shown
 
   /// What is written and shown.
   const PolicyResult& shown() const { return control ? *control : result; }

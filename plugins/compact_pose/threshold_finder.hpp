@@ -21,8 +21,8 @@ class TypicalMatch {
   void note(const Matrix& covariance);
   /// It was a false match. Does nothing if it is not among the latest any more.
   void forget(const Matrix& covariance);
-  /// A pose that it alone kept from being matched. After eight of them the poorer half is forgotten,
-  /// and the last one too.
+  /// A pose that it alone kept from being matched. After eight of them the poorer half is
+  /// forgotten, and the last one too.
   void note_silence();
   bool known() const { return !latest_.empty(); }
   const Matrix& covariance() const { return quartile_; }

@@ -156,8 +156,27 @@ TEST_F(Compact, LeavesWrongLoopClosuresOut) {
   const auto [wrong, note] = error("manhattan:poses=300,streets=5,outliers=20");
   EXPECT_THAT(quiet, Not(HasSubstr("left out")));
   EXPECT_THAT(note, HasSubstr("20 of 240 loop closures contradict the others and are left out"));
+  EXPECT_EQ(whole(wrong, "loops", "in"), 240);
+  EXPECT_EQ(whole(wrong, "loops", "kept"), 220);
+  ASSERT_THAT(wrong.at("left_out").as_array(), SizeIs(20));
+  EXPECT_THAT(wrong.at("left_out").at(0).as_array(), SizeIs(2));
+  EXPECT_THAT(right.at("left_out").as_array(), SizeIs(0));
   EXPECT_EQ(wrong.at("poses"), right.at("poses"));
   EXPECT_NEAR(ate(wrong, "whole"), ate(right, "whole"), 1e-6);
+}
+
+/// Files have no losses: what is written has the weights in its information.
+TEST_F(Compact, AWholeMapWithALossIsThatOfTheFile) {
+  const std::string in = folder_.file("in.g2o"), out = folder_.file("out.g2o"),
+                    way = folder_.file("way.g2o"), alone = folder_.file("alone.g2o");
+  ASSERT_EQ(cairn({"generate", "manhattan:poses=300,streets=5,outliers=30", "-o", in}).exit_code,
+            0);
+  const boost::json::value told =
+      report({in, "--loss", "cauchy", "--loss-on", "loops", "-o", out, "--trajectory", way});
+  EXPECT_EQ(told.at("strategy").as_string(), "whole");
+  ASSERT_EQ(cairn({"optimize", out, "--initial", "as_given", "-o", alone}).exit_code, 0);
+  const boost::json::value apart = parse_json(cairn({"evaluate", alone, way, "--json", "-"}).out);
+  EXPECT_LT(apart.at("ate").at("translation").to_number<double>(), 1e-5);
 }
 
 TEST_F(Compact, ThereIsNoWholeMapWhereMostLoopClosuresAreWrong) {

@@ -95,8 +95,8 @@ TEST_F(OnlinePolicy, SeveralMeasurementsOfAPairAndHeldPosesAreTakenAsInAFile) {
   }
   write_text(graph, more + "FIX 0\nFIX 120\n");
   const boost::json::value report =
-      report_of({"compact", graph, "--strategy", "fpfl", "--policy", kPolicy, "--registration", kRecorded, "-o",
-                 folder_.file("recorded.g2o"), "--quiet"});
+      report_of({"compact", graph, "--strategy", "fpfl", "--policy", kPolicy, "--registration",
+                 kRecorded, "-o", folder_.file("recorded.g2o"), "--quiet"});
   const Dialogue dialogue = drive(graph, online(kPolicy, {"-o", folder_.file("live.g2o")}));
   EXPECT_GT(report.at("loops").at("kept").as_int64(), 0);
   EXPECT_EQ(read_text(folder_.file("live.g2o")), read_text(folder_.file("recorded.g2o")));
@@ -107,8 +107,8 @@ TEST_F(OnlinePolicy, TheExampleInPythonDoesTheSame) {
   if (run_program({"python3", "--version"}).exit_code != 0) GTEST_SKIP() << "there is no python3";
   const std::string graph = generate("manhattan:poses=150");
   const boost::json::value report =
-      report_of({"compact", graph, "--strategy", "fpfl", "--policy", kPolicy, "--registration", kRecorded, "-o",
-                 folder_.file("recorded.g2o"), "--quiet"});
+      report_of({"compact", graph, "--strategy", "fpfl", "--policy", kPolicy, "--registration",
+                 kRecorded, "-o", folder_.file("recorded.g2o"), "--quiet"});
   const Outcome run =
       run_program({"python3", source_folder() + "/examples/live_front_end.py", graph, "-o",
                    folder_.file("live.g2o"), "--policy", kPolicy, "--cairn", program()});

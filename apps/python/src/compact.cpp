@@ -44,6 +44,7 @@ struct BoundResult {
   std::unique_ptr<BoundGraph> compact, trajectory;
   std::optional<MapCheck> check;
   std::optional<WholeMap> whole;
+  std::vector<std::vector<Id>> left_out;
   std::string strategy;
   std::vector<std::string> notes;
 
@@ -145,7 +146,8 @@ std::optional<EstimateOfAll> estimate_all(const PolicySetting& setting, BoundRes
   }
   if (std::string words = left_out_in_words(all, out.data); !words.empty()) {
     out.notes.push_back(std::move(words));
-    out.data = without_factors(std::move(out.data), all.left_out);
+    out.left_out = all.left_out_on;
+    out.data = without_contradictions(std::move(out.data), all);
   }
   return all;
 }
@@ -307,6 +309,9 @@ void bind_result(py::module_& module) {
                              "match with the map that was to be continued.")
       .def_readonly("strategy", &BoundResult::strategy,
                     "'whole', or that of the policy; empty: it has none.")
+      .def_readonly("left_out", &BoundResult::left_out,
+                    "Measurements that contradict the others and are left out: the ids of the "
+                    "variables of each.")
       .def_property_readonly(
           "kld",
           [](const BoundResult& bound) {
@@ -382,7 +387,7 @@ void bind_compact(py::module_& module) {
       py::arg("callback") = py::none(),
       R"(Runs a policy over a recorded graph: which poses and which loop closures are worth keeping (docs/compact.md).
 
-graph: poses with unbroken odometry by rising id, loop closures, absolute measurements, landmarks; it stays as it is.
+graph: poses with odometry by rising id, whose gaps other measurements bridge, loop closures, absolute measurements, landmarks; it stays as it is.
 policy: a name of `cairn.components("pose_policy")`; its options are further keyword arguments.
 strategy: "whole", the poses that the policy keeps with the information of all measurements of the graph; or what a robot
     can know while it drives: "fpfl", few poses and few loop closures, "apfl", all poses, "apal", all of both. None:

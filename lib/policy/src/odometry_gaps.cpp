@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <limits>
 #include <queue>
+#include <set>
 #include <utility>
 
 #include <fmt/core.h>
@@ -25,6 +26,7 @@ class Ways {
       const auto on = graph.factor_variables(f);
       if (on.size() != 2 || !graph.factor_type(f).is_relative()) continue;
       if (begin && std::min(graph.id(on[0]), graph.id(on[1])) < *begin) continue;
+      joined_.insert(std::minmax(on[0], on[1]));
       try {
         const MotionGroup group(graph.type_of(on[0]));
         const Motion motion = group.of_factor(graph.factor(f), graph.id(on[0]));
@@ -39,9 +41,7 @@ class Ways {
     }
   }
 
-  bool are_joined(int a, int b) const {
-    return std::ranges::any_of(from_[a], [&](const Edge& edge) { return edge.to == b; });
-  }
+  bool are_joined(int a, int b) const { return joined_.contains(std::minmax(a, b)); }
 
   /// Factors, from `from` on; none: there is no way (Dijkstra).
   std::vector<int> shortest(int from, int to) const {
@@ -77,6 +77,7 @@ class Ways {
     double length;
   };
   std::vector<std::vector<Edge>> from_;
+  std::set<std::pair<int, int>> joined_;  ///< also by less than a whole relative pose
 };
 
 Factor along(const Graph& graph, int from, const std::vector<int>& way) {

@@ -57,7 +57,8 @@ class Balance {
       positions_.push_back(f);
       new_.add(all_.factor(f));
     }
-    if (positions_.empty()) return;
+    // Beside new factors of other kinds the gradient would not become zero.
+    if (positions_.empty() || positions_.size() != change.factors.size()) return;
     equations_of_all_.emplace(all_, of_all);
     equations_.emplace(new_, of_new);
   }
@@ -176,6 +177,7 @@ void keep_minimum(const Graph& original, Sparsification& change,
     }
     if (reached < before) continue;
     balance.measure(measured);
+    reached = before;
     break;
   }
   if (!(reached < kFarLess * at_first)) return;

@@ -19,8 +19,9 @@ namespace cairn {
 /// factors alone, changing their residuals by J̆ δ, Λ δ = g, makes it zero: of all changes that do,
 /// that with the least Σ ‖Δr‖². A relative pose z between x_i and x_j whose residual there is to be
 /// that of the states x ⊕ δ measures h h'⁻¹ z then, h = x_i⁻¹ x_j and h' the same of x ⊕ δ.
-/// Repeated while gᵀδ falls. Other factors than relative ones of poses stay; without such, or where
-/// Λ is singular besides the gauge, nothing changes.
+/// Repeated while gᵀδ falls.
+/// Nothing changes where new factors are not all relative poses, or correlated pairs of these,
+/// where Λ is singular besides the gauge, or where gᵀδ does not become far less.
 void keep_minimum(const Graph& original, Sparsification& change,
                   const std::function<std::unique_ptr<LinearSolver>()>& make_solver);
 

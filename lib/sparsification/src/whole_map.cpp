@@ -16,6 +16,28 @@ namespace {
 
 /// All that may leave does, but for the poses that the job names; those with few neighbours first.
 constexpr const char* kSelection = "smallest_blanket:part=1";
+/// Information has to be positive.
+constexpr double kLeastWeight = 1e-9;
+
+/// The graph without losses: the information of each factor times the weight that its loss leaves
+/// it, so that the minimum is where it was.
+Graph weighted(const Graph& graph) {
+  Graph result = graph.clone();
+  if (!graph.has_losses()) return result;
+  const std::vector<double> norms = squared_norms(graph);
+  for (int f = 0; f < graph.factor_count(); ++f) {
+    const Loss* loss = graph.loss(f);
+    if (!loss) continue;
+    double weight = 1.0;
+    loss->evaluate({&norms[static_cast<std::size_t>(f)], 1}, {}, {&weight, 1});
+    const auto given = graph.information(f);
+    std::vector<double> information(given.begin(), given.end());
+    for (double& entry : information) entry *= std::max(weight, kLeastWeight);
+    result.set_measurement(f, graph.measurement(f), information);
+  }
+  result.set_loss(nullptr);
+  return result;
+}
 
 SparsifyResult take_out(const Graph& all, const PolicySetting& setting, const PolicyResult& chosen,
                         const std::function<void(const SparsifyProgress&)>& progress) {
@@ -25,11 +47,9 @@ SparsifyResult take_out(const Graph& all, const PolicySetting& setting, const Po
                   .as_given = true};
   for (int v = 0; v < chosen.compact.variable_count(); ++v)
     job.stay.push_back(chosen.compact.id(v));
-  return sparsify_whole(all, job,
+  return sparsify_whole(weighted(all), job,
                         {.registry = setting.registry,
                          .stop = {.interrupt = setting.interrupt},
-                         .loss = setting.loss,
-                         .loss_on = setting.loss_on,
                          .progress = progress});
 }
 
@@ -77,6 +97,8 @@ std::string why_no_whole_map(const PolicyJob& job, const PolicySetting& setting)
   if (!matches_as_recorded(job))
     return "what matches is not what was recorded, and so there is no map of all measurements";
   if (setting.data.landmarks > 0) return "the recording has landmarks";
+  if (std::ssize(setting.data.poses) != setting.data.recording.variable_count())
+    return "the recording has poses of earlier sessions";
   return {};
 }
 
@@ -91,21 +113,25 @@ WholeMap take_whole_map(const PolicyJob& job, const PolicySetting& setting,
   }
   SparsifyResult sparse = take_out(all.graph, setting, result, progress);
   if (sparse.interrupted) {
+    result.interrupted = true;
     map.why_not = "it was interrupted before the map of all measurements was made";
     return map;
   }
-  map.check = {.distance = sparse.error ? sparse.error->rmse_aligned : std::nan(""),
+  const bool absolute = setting.data.priors > 0;
+  map.check = {.distance = !sparse.error ? std::nan("")
+                           : absolute    ? sparse.error->rmse
+                                         : sparse.error->rmse_aligned,
                .extent = extent_of(trajectory(all.graph))};
   if (map.check.is_far()) {
     map.advice = {.finding = fmt::format("the map is {}", map.check.to_string()),
                   .options = lower_pose_gain(job, setting),
-                  .effect = "keeps more poses, and loses less"};
+                  .effect = "keeps more poses, and mostly loses less"};
     if (map.advice->options.empty()) map.advice.reset();
   }
   map.kld = sparse.error ? sparse.error->kld : std::nan("");
   map.factors_in = sparse.factors_before;
   map.factors_out = sparse.sparse.factor_count();
-  map.notes = std::move(sparse.notes);
+  if (!sparse.change.removed_variables.empty()) map.notes = std::move(sparse.notes);
   replace(result, all, std::move(sparse), setting);
   map.seconds = seconds_since(begin);
   return map;

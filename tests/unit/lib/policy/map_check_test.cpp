@@ -93,7 +93,7 @@ TEST_P(WrongLoops, AreLeftOutAllOfThemAndNoOther) {
     EXPECT_EQ(all.left_out, expected) << wrong;
     EXPECT_EQ(all.graph.factor_count(), right.factor_count());
     EXPECT_EQ(left_out_in_words(all, data_).empty(), wrong == 0);
-    const PolicyData rest = without_factors(std::move(data_), all.left_out);
+    const PolicyData rest = without_contradictions(std::move(data_), all);
     EXPECT_EQ(rest.loops, policy_data(right.clone()).loops);
     EXPECT_EQ(rest.recording.factor_count(), right.factor_count());
   }
@@ -101,6 +101,39 @@ TEST_P(WrongLoops, AreLeftOutAllOfThemAndNoOther) {
 
 INSTANTIATE_TEST_SUITE_P(All, WrongLoops,
                          ::testing::Values("manhattan:poses=200", "ellipse3d:poses=100"));
+
+/// A single step of odometry is wrong where it contradicts many loop closures, and no gap is left.
+TEST_F(MapCheckOf, AWrongStepOfOdometryIsLeftOutInsteadOfLoopClosures) {
+  const int step = data_.poses[150].odometry.front();
+  std::vector<double> z(data_.recording.measurement(step).begin(),
+                        data_.recording.measurement(step).end());
+  z[0] += 2.0;
+  Graph graph = data_.recording.clone();
+  graph.set_measurement(step, z, {});
+  data_ = policy_data(std::move(graph));
+  const EstimateOfAll all = estimate_of_all(setting_);
+  EXPECT_EQ(all.left_out, std::vector<int>{step});
+  EXPECT_EQ(all.loops_left_out, 0);
+  EXPECT_THAT(left_out_in_words(all, data_), HasSubstr("1 of 462 measurements contradict"));
+  const std::int64_t loops = data_.loops;
+  const PolicyData rest = without_contradictions(std::move(data_), all);
+  EXPECT_EQ(rest.loops, loops);
+  ASSERT_THAT(rest.gaps, SizeIs(1));
+  EXPECT_EQ(rest.gaps[0].after, 150);
+}
+
+/// Where loops are sparse a right one seems to be wrong beside a wrong one, and comes back.
+TEST_F(MapCheckOf, NoRightLoopIsLeftOutBesideAWrongOne) {
+  for (const std::uint64_t seed : {4, 6, 8}) {
+    const auto world = [&](const char* wrong) {
+      const std::string name = "city:poses=500,loop_density=0.05,loops_per_pose=1";
+      return registry_.make<Generator>(name + wrong)->generate(registry_, seed).graph;
+    };
+    const Graph right = world(""), graph = world(",outliers=2");
+    data_ = policy_data(graph.clone());
+    EXPECT_EQ(estimate_of_all(setting_).left_out, planted(graph, right)) << seed;
+  }
+}
 
 /// Where most are wrong, there is no saying which.
 TEST_F(MapCheckOf, ThereIsNoEstimateWhereMostLoopsAreWrong) {

@@ -2,6 +2,7 @@
 #include "cairn/policy/selection_check.hpp"
 
 #include <optional>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -37,7 +38,10 @@ class SelectionChecks : public ::testing::Test {
     registration->begin({.recording = &world_.graph, .truth = &world_.truth});
     FunctionRegistration shifted([&](Id earlier, Id later) {
       std::vector<Factor> match = registration->match(earlier, later);
-      for (Factor& factor : match) factor.measurement[0] += shift_;
+      std::mt19937_64 random(static_cast<std::uint64_t>(1009 * earlier + later));
+      std::uniform_real_distribution<double> any(0.5, 1.0);
+      const double where = random() % 2 == 0 ? any(random) : -any(random);
+      for (Factor& factor : match) factor.measurement[0] += shift_ * where;
       return match;
     });
     const test::PolicyRun run = test::run(registry_.make<PosePolicy>(spec), shifted, world_.graph);
@@ -52,7 +56,7 @@ class SelectionChecks : public ::testing::Test {
   }
   Registry registry_;
   Simulation world_ = test::simulate(registry_, "manhattan:poses=200,streets=4");
-  double shift_ = 0.0;  ///< of every match along x [m]
+  double shift_ = 0.0;  ///< of a match along x, at most and at least half of it [m]
   std::string matcher_ = "simulated:range=3,angle=3.14";
   OptionValues common_{{"range", "4"}, {"angle", "3.15"}};
 };

@@ -46,8 +46,8 @@ struct SparsifyJob {
   /// Online: one of so many nodes is known to stay, and factors to older nodes that are to leave
   /// are redirected at once (Vallvé 2018, section 4.6.4); 0: only once these have left.
   int redirect_early = 0;
-  /// Of a whole graph: relative poses that are added measure what keeps the minimum where it is; else
-  /// what their blanket's own minimum is, as in the thesis.
+  /// Of a whole graph: relative poses that are added measure what keeps the minimum where it is;
+  /// else what their blanket's own minimum is, as in the thesis.
   bool keep_minimum = true;
   bool as_given = false;  ///< the graph is at its minimum: it is not optimised before
   bool measure = true;    ///< KLD, RMSE and conservative margin of the whole

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "cairn/policy/estimate_of_all.hpp"
 #include "cairn/policy/map_check.hpp"
 #include "cairn/policy/policy_run.hpp"
 #include "cairn/policy/selection_check.hpp"
@@ -22,7 +23,7 @@ struct WholeMap {
   /// run's own map is all there is.
   std::string why_not = {};
   /// How far the poses of the compact graph are, at its own minimum, from the estimate of all
-  /// measurements.
+  /// measurements; without alignment where absolute measurements say where the graph is.
   MapCheck check = {};
   /// Where that is far: a threshold with which less is lost.
   std::optional<SelectionCheck::Advice> advice = {};
@@ -33,7 +34,8 @@ struct WholeMap {
 };
 
 /// Why a run of `job` cannot end in such a map, whatever is measured: matches are not those of the
-/// recording (`matches_as_recorded`), or the recording has landmarks. Empty: it can.
+/// recording (`matches_as_recorded`), or the recording has landmarks, or poses of earlier sessions.
+/// Empty: it can.
 CAIRN_API std::string why_no_whole_map(const PolicyJob& job, const PolicySetting& setting);
 
 /// Replaces what a run has found by what all measurements say: takes the poses that the policy has
@@ -41,7 +43,9 @@ CAIRN_API std::string why_no_whole_map(const PolicyJob& job, const PolicySetting
 /// graph of `result` is then what is left, at its minimum; the trajectory is the estimate of all
 /// measurements; chi2 is that of all measurements, of which all are kept; errors are under the name
 /// "whole". Nothing is replaced where `why_not` says why. `all` is of the same recording
-/// (`estimate_of_all`), without what it leaves out (`without_factors`). `progress` may be empty.
+/// (`estimate_of_all`), without what it leaves out (`without_contradictions`). Robust losses, which
+/// files do not hold, become weights that the information of each factor is multiplied by.
+/// `progress` may be empty.
 CAIRN_API WholeMap take_whole_map(
     const PolicyJob& job, const PolicySetting& setting, const EstimateOfAll& all,
     PolicyResult& result, const std::function<void(const SparsifyProgress&)>& progress = {});
