@@ -13,6 +13,7 @@
 #include "cairn/graph/factor_selector.hpp"
 #include "cairn/graph/gauge.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/update/rejected_factors.hpp"
 #include "trial_losses.hpp"
 
 namespace cairn::initial {
@@ -139,13 +140,9 @@ class Search {
   std::vector<int> below(double fraction) const {
     std::vector<int> result;
     if (!graph_.has_losses()) return result;
-    const std::vector<double> norms = squared_norms(graph_);
-    for (int f = 0; f < graph_.factor_count(); ++f) {
-      double weight = 1.0;
-      if (const Loss* loss = graph_.loss(f))
-        loss->evaluate({&norms[static_cast<std::size_t>(f)], 1}, {}, {&weight, 1});
-      if (weight < fraction) result.push_back(f);
-    }
+    const std::vector<double> weights = loss_weights(graph_);
+    for (int f = 0; f < graph_.factor_count(); ++f)
+      if (weights[static_cast<std::size_t>(f)] < fraction) result.push_back(f);
     return result;
   }
 

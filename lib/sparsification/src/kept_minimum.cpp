@@ -100,13 +100,16 @@ class Balance {
     return all;
   }
 
-  /// The same where their residuals are to be those at x ⊕ part · δ.
-  std::vector<std::vector<double>> adjusted(double part) const {
-    std::vector<double> step = step_;
-    for (double& entry : step) entry *= part;
+  /// The δ of the last `solve`.
+  const std::vector<double>& step() const { return step_; }
+
+  /// What the new factors are to measure, instead of `measured`, for residuals that are those at
+  /// x ⊕ step.
+  std::vector<std::vector<double>> adjusted(const std::vector<std::vector<double>>& measured,
+                                            std::span<const double> step) const {
     Values moved = new_.values();
     equations_->linearizer().retract(new_.values(), step, moved);
-    std::vector<std::vector<double>> all = measurements();
+    std::vector<std::vector<double>> all = measured;
     for (std::size_t k = 0; k < positions_.size(); ++k) {
       const auto on = new_.factor_variables(static_cast<int>(k));
       const StateGroup group(new_.type(on[0]));
@@ -168,11 +171,12 @@ void keep_minimum(const Graph& original, Sparsification& change,
   const bool possible = std::isfinite(reached);
   for (int round = 0; possible && round < kRounds && reached > kSettled * at_first; ++round) {
     const auto measured = balance.measurements();
-    std::vector<std::vector<std::vector<double>>> tries;
-    for (const double part : kParts) tries.push_back(balance.adjusted(part));
+    const std::vector<double> whole = balance.step();
     const double before = reached;
-    for (std::size_t k = 0; k < tries.size() && !(reached < before); ++k) {
-      balance.measure(tries[k]);
+    for (std::size_t k = 0; k < std::size(kParts) && !(reached < before); ++k) {
+      std::vector<double> step = whole;
+      for (double& entry : step) entry *= kParts[k];
+      balance.measure(balance.adjusted(measured, step));
       reached = balance.solve();
     }
     if (reached < before) continue;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/sparsification/whole_map.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <string>
@@ -10,6 +11,7 @@
 
 #include "cairn/geometry/pose.hpp"
 #include "cairn/runtime/timed.hpp"
+#include "cairn/update/rejected_factors.hpp"
 
 namespace cairn {
 namespace {
@@ -24,15 +26,13 @@ constexpr double kLeastWeight = 1e-9;
 Graph weighted(const Graph& graph) {
   Graph result = graph.clone();
   if (!graph.has_losses()) return result;
-  const std::vector<double> norms = squared_norms(graph);
+  const std::vector<double> weights = loss_weights(graph);
   for (int f = 0; f < graph.factor_count(); ++f) {
-    const Loss* loss = graph.loss(f);
-    if (!loss) continue;
-    double weight = 1.0;
-    loss->evaluate({&norms[static_cast<std::size_t>(f)], 1}, {}, {&weight, 1});
+    if (!graph.loss(f)) continue;
+    const double weight = std::max(weights[static_cast<std::size_t>(f)], kLeastWeight);
     const auto given = graph.information(f);
     std::vector<double> information(given.begin(), given.end());
-    for (double& entry : information) entry *= std::max(weight, kLeastWeight);
+    for (double& entry : information) entry *= weight;
     result.set_measurement(f, graph.measurement(f), information);
   }
   result.set_loss(nullptr);

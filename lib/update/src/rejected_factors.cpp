@@ -21,17 +21,25 @@ std::string counted(std::int64_t rejected, std::int64_t all, std::string_view wh
 
 }  // namespace
 
+std::vector<double> loss_weights(const Graph& graph) {
+  std::vector<double> weights(static_cast<std::size_t>(graph.factor_count()), 1.0);
+  if (!graph.has_losses()) return weights;
+  const std::vector<double> norms = squared_norms(graph);
+  for (std::size_t f = 0; f < weights.size(); ++f) {
+    if (const Loss* loss = graph.loss(static_cast<int>(f)))
+      loss->evaluate({&norms[f], 1}, {}, {&weights[f], 1});
+  }
+  return weights;
+}
+
 RejectedFactors rejected_factors(const Graph& graph) {
   RejectedFactors result;
   if (!graph.has_losses()) return result;
-  const std::vector<double> norms = squared_norms(graph);
+  const std::vector<double> weights = loss_weights(graph);
   const std::vector<bool> loops = loop_closures(graph);
   for (int f = 0; f < graph.factor_count(); ++f) {
-    const Loss* loss = graph.loss(f);
-    if (!loss) continue;
-    double weight = 1.0;
-    loss->evaluate({&norms[f], 1}, {}, {&weight, 1});
-    const bool rejected = weight < kRejected;
+    if (!graph.loss(f)) continue;
+    const bool rejected = weights[f] < kRejected;
     if (rejected) result.positions.push_back(f);
     ++(loops[f] ? result.loops : result.others);
     (loops[f] ? result.rejected_loops : result.rejected_others) += rejected;

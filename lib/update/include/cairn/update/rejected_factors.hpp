@@ -11,6 +11,10 @@
 
 namespace cairn {
 
+/// By position, the weight ρ′ that each factor's loss leaves it at the graph's states; 1 without
+/// one.
+CAIRN_API std::vector<double> loss_weights(const Graph& graph);
+
 /// How many factors robust losses have all but taken from an estimate: whose weight ρ′ at the
 /// graph's states is below one per cent.
 struct RejectedFactors {
