@@ -12,17 +12,13 @@ namespace {
 constexpr double kSameGoal = 1.0;
 
 /// The sentence with which a run without any frontier left ends.
-std::string end_text(const FrontierGoals& goals, const RobotModel& robot, double smallest) {
+std::string end_text(const FrontierGoals& goals, double smallest) {
   if (goals.unreachable() == 0)
     return fmt::format("no frontier of {:g} m or more is left", smallest);
-  const std::string path =
-      robot.motion == MotionModel::dubins
-          ? fmt::format("a curve with a turning radius of {:g} m", robot.turning_radius)
-          : "a path";
   return fmt::format(
-      "no frontier of {:g} m or more is left that can be reached; {} without {} or tried in vain, "
-      "the longest {:.1f} m",
-      smallest, goals.unreachable(), path, goals.longest_unreachable());
+      "no frontier of {:g} m or more is left that can be reached; {} without a path or tried in "
+      "vain, the longest {:.1f} m",
+      smallest, goals.unreachable(), goals.longest_unreachable());
 }
 
 }  // namespace
@@ -57,7 +53,7 @@ Decision FrontierExplorer::decide(const Situation& situation) {
       return decision;
     }
     decision.kind = Decision::Kind::finished;
-    decision.why = end_text(goals_, situation.robot, smallest);
+    decision.why = end_text(goals_, smallest);
     return decision;
   }
   for (Candidate& candidate : decision.candidates) {

@@ -110,8 +110,8 @@ std::optional<PlannedPath> FrontierGoals::path_to(const Pose2& pose) {
   if (!path) return path;
   const Vector2d end = path->points.empty() ? pose.translation() : path->points.back();
   path->look_at = end + Vector2d(std::cos(pose.theta()), std::sin(pose.theta()));
-  path = driven(std::move(*path));
-  if (!path || !moves(*path)) return std::nullopt;
+  path->radius = narrow_radius_;
+  if (!moves(*path)) return std::nullopt;
   return path;
 }
 
@@ -133,8 +133,8 @@ std::optional<PlannedPath> FrontierGoals::path_to(const Frontier& frontier) {
 std::optional<PlannedPath> FrontierGoals::path_to(const Vector2d& goal) {
   if (is_given_up(goal)) return std::nullopt;
   std::optional<PlannedPath> path = planner_->path_to(goal, kNear);
-  if (path) path = driven(std::move(*path));
   if (!path || comes_no_nearer(goal, path->length)) return std::nullopt;
+  path->radius = narrow_radius_;
   if (moves(*path)) return path;
   give_up(goal);
   return std::nullopt;
@@ -148,13 +148,6 @@ bool FrontierGoals::is_there(const FloorMap& map, const Vector2d& middle) {
   return std::ranges::any_of(map.frontiers, [&](const Frontier& frontier) {
     return std::ranges::any_of(frontier.cells, near);
   });
-}
-
-std::optional<PlannedPath> FrontierGoals::driven(PlannedPath path) const {
-  std::optional<PlannedPath> driven = drivable_path(
-      std::move(path), situation_->pose, situation_->robot, situation_->map, situation_->interrupt);
-  if (driven) driven->radius = narrow_radius_;
-  return driven;
 }
 
 bool FrontierGoals::moves(const PlannedPath& path) const {

@@ -77,8 +77,6 @@ class FrontierGoals {
   void give_up(const Eigen::Vector2d& goal);
   bool is_given_up(const Eigen::Vector2d& goal) const;
   bool comes_no_nearer(const Eigen::Vector2d& goal, double length) const;
-  /// A path as the robot can drive it; none: it can't.
-  std::optional<PlannedPath> driven(PlannedPath path) const;
   bool moves(const PlannedPath& path) const;
 
   std::unique_ptr<PathPlanner> planner_;

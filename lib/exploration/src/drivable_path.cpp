@@ -35,6 +35,9 @@ constexpr double kArcCells = 1.5;
 /// A metre on an arc costs so much more than a straight one, and so much more for each metre that
 /// it lies away from the path, up to the most.
 constexpr double kTurnCost = 0.05, kAwayCost = 1.0, kMostAway = 1.0;
+/// A metre backwards, where the lidar does not look, costs so many metres ahead, and each change of
+/// direction so many [m].
+constexpr double kBackCost = 2.0, kCuspCost = 1.0;
 /// Headings at the end of a path: this far apart [rad], so much of the lidar's aperture to either
 /// side of what it shall see, and no more than the most.
 constexpr double kHeadingStep = pi / 12.0, kSeenPart = 0.4, kMostAside = pi / 3.0;
@@ -112,12 +115,13 @@ bool is_followed(const PlannedPath& path, const Pose2& from, const RobotModel& r
     const double chord = motion->translation().norm();
     const double turn = motion->theta();
     const double length = std::abs(turn) < 1e-9 ? chord : chord * 0.5 * turn / std::sin(0.5 * turn);
+    const double way = motion->x() < 0.0 ? -1.0 : 1.0;  // backwards, or ahead
     driven += length;
     if (!(length > 1e-6) || driven > most) return false;
     const int strides = 1 + static_cast<int>(length / room.stride());
     for (int k = 1; k <= strides; ++k) {
       const double part = double(k) / strides;
-      const Pose2 on = at * along_arc(turn / length, part * length);
+      const Pose2 on = at * along_arc(way * turn / length, way * part * length);
       if (!room.admits(on.translation(), before)) return false;
     }
     at = at * *motion;
@@ -130,8 +134,8 @@ bool is_followed(const PlannedPath& path, const Pose2& from, const RobotModel& r
 }
 
 /// Hybrid A* from a pose to the end of a path: arcs and straight lines of one length from pose to
-/// pose, of which one for each cell and heading is kept, and from some of them Dubins curves that
-/// end at the goal exactly.
+/// pose, ahead and backwards, of which one for each cell and heading is kept, and from some of them
+/// Dubins curves that end at the goal exactly.
 class CurveSearch {
  public:
   /// `interrupt`: once it is true there is no curve; may be null.
@@ -165,7 +169,9 @@ class CurveSearch {
         if (const auto curve = curve_to_goal(node)) return joined(index, *curve);
         ++tries_;
       }
-      for (const int turn : {0, 1, -1}) expand(index, turn);
+      for (const double way : {1.0, -1.0}) {
+        for (const int turn : {0, 1, -1}) expand(index, turn, way);
+      }
     }
     return std::nullopt;
   }
@@ -175,7 +181,8 @@ class CurveSearch {
     Pose2 at;
     double cost = 0.0, clearance = 0.0;
     std::size_t parent = 0;
-    int turn = 0;  ///< of the arc that leads here
+    int turn = 0;      ///< of the arc that leads here
+    double way = 1.0;  ///< ahead; −1: backwards
   };
   struct Goal {
     Pose2 at;
@@ -271,18 +278,19 @@ class CurveSearch {
     return true;
   }
 
-  void expand(std::size_t index, int turn) {
+  void expand(std::size_t index, int turn, double way) {
     const Node from = nodes_[index];
-    Node next{.at = {}, .clearance = from.clearance, .parent = index, .turn = turn};
+    Node next{.at = {}, .clearance = from.clearance, .parent = index, .turn = turn, .way = way};
     const double curvature = turn / radius_;
-    const auto at = [&](double length) { return from.at * along_arc(curvature, length); };
+    const auto at = [&](double length) { return from.at * along_arc(curvature, way * length); };
     if (!is_free(arc_, from.clearance, at, &next.clearance)) return;
     next.at = at(arc_);
     const double ahead = left(next.at);
     if (!std::isfinite(ahead)) return;
     const double per_metre =
         1.0 + (turn != 0 ? kTurnCost : 0.0) + kAwayCost * away(next.at.translation());
-    next.cost = from.cost + arc_ * per_metre;
+    next.cost = from.cost + arc_ * per_metre * (way < 0.0 ? kBackCost : 1.0) +
+                (way != from.way ? kCuspCost : 0.0);
     open_.push({next.cost + ahead, nodes_.size()});
     nodes_.push_back(next);
   }
@@ -325,37 +333,52 @@ class CurveSearch {
     std::ranges::reverse(chain);
     PlannedPath result{.points = {}, .look_at = path_.look_at, .radius = path_.radius};
     result.points.push_back(nodes_.front().at.translation());
-    for (std::size_t k = 0; k + 1 < chain.size();) k = append_shortcut(chain, k, result);
+    double way = 1.0;
+    const auto drive = [&](double next) {
+      if (std::exchange(way, next) != next) result.cusps.push_back(result.points.size() - 1);
+    };
+    for (std::size_t k = 0; k + 1 < chain.size();) {
+      drive(nodes_[chain[k + 1]].way);
+      k = append_shortcut(chain, k, result);
+    }
+    drive(1.0);
     append(nodes_[last].at, to_goal, result);
     return result;
   }
 
-  /// A curve from a node to the farthest one behind it to which there is a shorter one than the
-  /// arcs; returns where it leads.
+  /// A curve from a node to the farthest one behind it, in the same direction, to which there is a
+  /// shorter one than the arcs; returns where it leads.
   std::size_t append_shortcut(const std::vector<std::size_t>& chain, std::size_t from,
                               PlannedPath& result) const {
     const Node& node = nodes_[chain[from]];
+    const Node& next = nodes_[chain[from + 1]];
     constexpr double kRounding = 1e-6;
-    for (std::size_t to = chain.size() - 1; to > from + 1; --to) {
+    std::size_t farthest = from;
+    while (farthest + 1 < chain.size() && nodes_[chain[farthest + 1]].way > 0.0) ++farthest;
+    for (std::size_t to = farthest; to > from + 1; --to) {
       const double arcs = arc_ * static_cast<double>(to - from);
       const auto curve = free_curve(node, nodes_[chain[to]].at, arcs + kRounding);
       if (!curve) continue;
       append(node.at, *curve, result);
       return to;
     }
-    const DubinsCurve one{.turns = {nodes_[chain[from + 1]].turn, 0, 0},
-                          .lengths = {arc_, 0.0, 0.0},
-                          .radius = radius_};
-    append(node.at, one, result);
+    append(
+        arc_, [&](double s) { return node.at * along_arc(next.turn / radius_, next.way * s); },
+        result);
     return from + 1;
   }
 
   void append(const Pose2& from, const DubinsCurve& curve, PlannedPath& result) const {
-    const int strides = 1 + static_cast<int>(curve.length() / room_.stride());
+    append(
+        curve.length(), [&](double distance) { return from * curve.at(distance); }, result);
+  }
+
+  template <class Along>
+  void append(double length, Along&& at, PlannedPath& result) const {
+    const int strides = 1 + static_cast<int>(length / room_.stride());
     for (int k = 1; k <= strides; ++k)
-      result.points.push_back(
-          (from * curve.at(curve.length() * (double(k) / strides))).translation());
-    result.length += curve.length();
+      result.points.push_back(at(length * (double(k) / strides)).translation());
+    result.length += length;
   }
 
   const PlannedPath& path_;

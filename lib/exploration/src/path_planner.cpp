@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 
 #include "cairn/exploration/dubins_curve.hpp"
 
@@ -48,31 +49,37 @@ std::optional<Pose2> turning_motion(const Pose2& at, const PlannedPath& path,
 
 // Along arcs --------------------------------------------------------------------------------------
 
-/// Passes the points that are reached, and those that lie behind the robot and near it.
-void pass_points(const Pose2& at, const PlannedPath& path, const RobotModel& robot,
-                 std::size_t& passed) {
+/// A part of a path in one direction, as one that is driven ahead.
+using Leg = std::span<const Eigen::Vector2d>;
+
+/// Passes the points that are reached, and those that lie behind the robot and near it. Returns how
+/// many are left.
+std::size_t pass_points(const Pose2& at, const RobotModel& robot, bool ends_in_cusp, Leg leg) {
   const double there = there_of(robot);
-  for (; passed < path.points.size(); ++passed) {
-    const Eigen::Vector2d& point = path.points[passed];
+  // A motion of millimetres would only cost a scan.
+  constexpr double kAtCusp = 0.02, kRounding = 1e-9;  // [m]
+  for (; !leg.empty(); leg = leg.subspan(1)) {
+    const Eigen::Vector2d& point = leg.front();
     const double apart = (point - at.translation()).norm();
-    const bool is_last = passed + 1 == path.points.size();
-    const double ahead = is_last ? at.transform_to(point).x()
-                                 : (point - at.translation()).dot(path.points[passed + 1] - point);
+    const bool is_last = leg.size() == 1;
+    const double ahead =
+        is_last ? at.transform_to(point).x() : (point - at.translation()).dot(leg[1] - point);
     // The last one has to be reached as well as can be: nothing leads nearer once it is behind.
-    const bool is_passed = ahead <= 0.0 && apart < robot.step;
-    if (!is_passed && (is_last || apart >= there)) return;
+    const double reached = is_last && ends_in_cusp ? kAtCusp : kRounding;
+    const bool is_passed = ahead <= reached && apart < robot.step;
+    if (!is_passed && (is_last || apart >= there)) break;
   }
+  return leg.size();
 }
 
-/// The point of a path so far ahead [m], or its end.
-Eigen::Vector2d point_ahead(const Pose2& at, const PlannedPath& path, std::size_t passed,
-                            double distance) {
+/// The point of a leg so far ahead [m], or its end.
+Eigen::Vector2d point_ahead(const Pose2& at, Leg leg, double distance) {
   Eigen::Vector2d from = at.translation();
-  for (std::size_t k = passed; k < path.points.size(); ++k) {
-    const double part = (path.points[k] - from).norm();
-    if (part >= distance) return from + distance / part * (path.points[k] - from);
+  for (const Eigen::Vector2d& point : leg) {
+    const double part = (point - from).norm();
+    if (part >= distance) return from + distance / part * (point - from);
     distance -= part;
-    from = path.points[k];
+    from = point;
   }
   return from;
 }
@@ -97,32 +104,50 @@ Arc arc_to(const Pose2& at, const Eigen::Vector2d& point, double turning_radius)
 }
 
 /// The farthest from the path that an arc comes between its ends [m], about.
-double strayed(const Pose2& at, const Arc& arc, const PlannedPath& path, std::size_t passed) {
+double strayed(const Pose2& at, const Arc& arc, Leg leg) {
   double most = 0.0;
   for (const double part : {0.25, 0.5, 0.75}) {
     const double driven = part * arc.length;
     const Eigen::Vector2d point = (at * along_arc(arc.curvature, driven)).translation();
-    most = std::max(most, (point - point_ahead(at, path, passed, driven)).norm());
+    most = std::max(most, (point - point_ahead(at, leg, driven)).norm());
   }
   return most;
 }
 
-std::optional<Pose2> arc_motion(const Pose2& at, const PlannedPath& path, const RobotModel& robot,
-                                std::size_t& passed) {
-  pass_points(at, path, robot, passed);
-  if (passed == path.points.size()) return std::nullopt;
+/// Ahead along a leg, of which points are left.
+Pose2 motion_along(const Pose2& at, Leg leg, const RobotModel& robot) {
   // A point far ahead makes long motions, a near one cuts no corners.
   constexpr double kStray = 0.02;  // [m]
   constexpr int kHalvings = 3;
   Arc arc;
   double ahead = robot.step;
   for (int k = 0; k <= kHalvings; ++k, ahead *= 0.5) {
-    arc = arc_to(at, point_ahead(at, path, passed, ahead), robot.turning_radius);
-    if (strayed(at, arc, path, passed) < kStray) break;
+    arc = arc_to(at, point_ahead(at, leg, ahead), robot.turning_radius);
+    if (strayed(at, arc, leg) < kStray) break;
   }
   double length = std::min(arc.length, robot.step);
   if (std::abs(arc.curvature) * length > robot.turn) length = robot.turn / std::abs(arc.curvature);
   return along_arc(arc.curvature, length);
+}
+
+/// A robot that backs is one that drives ahead with the opposite heading.
+std::optional<Pose2> arc_motion(const Pose2& at, const PlannedPath& path, const RobotModel& robot,
+                                std::size_t& passed) {
+  const Pose2 about(0.0, 0.0, std::numbers::pi);
+  while (passed < path.points.size()) {
+    const auto cusp = std::ranges::lower_bound(path.cusps, passed);
+    const bool backs = (cusp - path.cusps.begin()) % 2 == 1;
+    const bool ends_in_cusp = cusp != path.cusps.end();
+    const std::size_t end = ends_in_cusp ? *cusp + 1 : path.points.size();
+    const Leg leg(path.points.data() + passed, end - passed);
+    const Pose2 heading = backs ? at * about : at;
+    const std::size_t left = pass_points(heading, robot, ends_in_cusp, leg);
+    passed = end - left;
+    if (left == 0) continue;
+    const Pose2 motion = motion_along(heading, leg.last(left), robot);
+    return backs ? Pose2(-motion.x(), -motion.y(), motion.theta()) : motion;
+  }
+  return std::nullopt;
 }
 
 }  // namespace

@@ -30,7 +30,8 @@ std::vector<Vector2d> places_along(const Pose2& motion, MotionModel model) {
   for (int k = 0; k <= strides; ++k) {
     const double part = double(k) / std::max(1, strides);
     const bool is_arc = model == MotionModel::dubins && std::abs(turn) > 1e-9;
-    const double length = is_arc ? 0.5 * chord * turn / std::sin(0.5 * turn) : chord;
+    const double way = motion.x() < 0.0 ? -1.0 : 1.0;  // backwards, or ahead
+    const double length = is_arc ? way * 0.5 * chord * turn / std::sin(0.5 * turn) : chord;
     places.push_back(is_arc ? along_arc(turn / length, part * length).translation()
                             : part * motion.translation());
   }

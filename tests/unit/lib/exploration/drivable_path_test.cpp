@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <tuple>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -67,7 +68,8 @@ Pose2 followed(Pose2 at, const PlannedPath& path, const RobotModel& robot, const
     }
     const double chord = motion->translation().norm(), half = 0.5 * motion->theta();
     const double length = std::abs(half) < 1e-9 ? chord : chord * half / std::sin(half);
-    EXPECT_NEAR(std::atan2(motion->y(), motion->x()), half, 1e-9);
+    const double way = motion->x() > 0.0 ? 1.0 : -1.0;
+    EXPECT_NEAR(std::atan2(way * motion->y(), way * motion->x()), half, 1e-9);
     EXPECT_LE(std::abs(motion->theta()) * robot.turning_radius, length + 1e-9);
     EXPECT_LE(std::abs(motion->theta()), robot.turn + 1e-9);
     EXPECT_LE(length, robot.step + 1e-9);
@@ -163,15 +165,63 @@ TEST(DrivablePath, ThereIsNoneOnceTheSearchIsInterrupted) {
   EXPECT_FALSE(drivable_path(path, start, robot, map, &interrupt));
 }
 
-TEST(DrivablePath, ThereIsNoneWhereTheRobotCannotTurn) {
+TEST(DrivablePath, BacksOutWhereTheRobotCannotTurn) {
   const FloorMap map = room_and_corridor();
   // In the corridor, at its end, which it faces.
   const PlannedPath back{
       .points = {{7.0, 1.6}, {4.0, 1.6}}, .length = 3.0, .look_at = Vector2d(1.0, 1.6)};
-  EXPECT_FALSE(drivable_path(back, Pose2(7.0, 1.6, 0.0), dubins_robot(0.5), map));
-  // And one that turns in a narrower circle than the room is.
+  // And one that turns in a wider circle than the room is.
   const PlannedPath on{.points = {{4.0, 1.6}, {7.0, 1.6}}, .length = 3.0, .look_at = {}};
-  EXPECT_FALSE(drivable_path(on, Pose2(4.0, 1.6, pi), dubins_robot(1.4), map));
+  for (const auto& [path, start, radius] :
+       {std::tuple(back, Pose2(7.0, 1.6, 0.0), 0.5), std::tuple(on, Pose2(4.0, 1.6, pi), 1.4)}) {
+    const RobotModel robot = dubins_robot(radius);
+    const auto curve = drivable_path(path, start, robot, map);
+    ASSERT_TRUE(curve);
+    EXPECT_FALSE(curve->cusps.empty());
+    double driven = 0.0;
+    const Pose2 end = followed(start, *curve, robot, map, &driven);
+    EXPECT_LT((end.translation() - path.points.back()).norm(), 0.15);
+    EXPECT_NEAR(driven, curve->length, 0.1 * curve->length + 0.2);
+  }
+}
+
+TEST(DrivablePath, ThereIsNoneThroughAWall) {
+  const FloorMap map = room(80, 32, [](int x, int) { return x == 30; });
+  const PlannedPath path{.points = {{2.0, 1.6}, {5.0, 1.6}}, .length = 3.0, .look_at = {}};
+  EXPECT_FALSE(drivable_path(path, Pose2(2.0, 1.6, pi), dubins_robot(0.5), map));
+}
+
+/// A path with cusps: ahead, back along the same line, and ahead again.
+TEST(NextMotion, BacksBetweenCusps) {
+  const RobotModel robot = dubins_robot(0.5);
+  const PlannedPath path{
+      .points = {{0.0, 0.0}, {1.0, 0.0}, {-1.0, 0.0}, {2.0, 0.0}}, .length = 6.0, .cusps = {1, 2}};
+  std::size_t passed = 0;
+  Pose2 at;
+  double ahead = 0.0, back = 0.0, least = 0.0;
+  while (const auto motion = next_motion(at, path, robot, passed)) {
+    EXPECT_NEAR(motion->y(), 0.0, 1e-12);
+    (motion->x() > 0.0 ? ahead : back) += std::abs(motion->x());
+    at = at * *motion;
+    least = std::min(least, at.x());
+    ASSERT_LT(ahead + back, 10.0);
+  }
+  EXPECT_NEAR(ahead, 4.0, 0.1);
+  EXPECT_NEAR(back, 2.0, 0.1);
+  EXPECT_NEAR(least, -1.0, 0.05);
+  EXPECT_NEAR(at.x(), 2.0, 1e-9);
+  // Backwards along an arc: a robot that drives ahead on its mirror image.
+  const PlannedPath behind{.points = {{0.0, 0.0}, {-1.0, 0.5}}, .length = 1.2, .cusps = {0}};
+  passed = 0;
+  at = Pose2();
+  int motions = 0;
+  while (const auto motion = next_motion(at, behind, robot, passed)) {
+    ASSERT_LT(++motions, 20);
+    EXPECT_LT(motion->x(), 0.0);
+    EXPECT_NEAR(std::atan2(-motion->y(), -motion->x()), 0.5 * motion->theta(), 1e-9);
+    at = at * *motion;
+  }
+  EXPECT_LT((at.translation() - behind.points.back()).norm(), 0.1);
 }
 
 TEST(NextMotion, HolonomicDrivesAtOnceAndTurnsOnTheWay) {

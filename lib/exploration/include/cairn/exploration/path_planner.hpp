@@ -25,6 +25,9 @@ struct PlannedPath {
   std::optional<Eigen::Vector2d> look_at = {};  ///< towards which the robot turns at its end [m]
   /// Radius of the body for which it was planned [m]; 0: the robot's.
   double radius = 0.0;
+  /// Of a robot that can't turn in place, ascending: the points where it changes its direction. It
+  /// drives ahead as far as the first of them, backwards from there to the second, and so on.
+  std::vector<std::size_t> cusps = {};
 };
 
 /// How near an obstacle, or an unknown cell, the centre of a round body may come: its radius and
@@ -57,8 +60,9 @@ class CAIRN_API PathPlanner : public Component {
 
 /// The next motion along a path, as far as `robot.step` and `robot.turn` allow in one:
 /// `differential` turns first and then drives straight, `holonomic` drives at once and turns to
-/// where it drives on the way, `dubins` takes the arc to a point ahead on the path, no narrower
-/// than its turning radius (pure pursuit): it follows the paths that `drivable_path` returns.
+/// where it drives on the way, `dubins` takes the arc to a point ahead on the path, or behind it
+/// where it backs, no narrower than its turning radius (pure pursuit): it follows the paths that
+/// `drivable_path` returns.
 /// `passed` counts the points of the path that are behind the robot, and is advanced. None: it is
 /// there, and looks where it shall, which `dubins` does only if the path leads it so.
 CAIRN_API std::optional<Pose2> next_motion(const Pose2& at, const PlannedPath& path,
@@ -68,7 +72,8 @@ CAIRN_API std::optional<Pose2> next_motion(const Pose2& at, const PlannedPath& p
 /// in place, and for `dubins` where following it comes near no obstacle; otherwise along arcs and
 /// Dubins curves, searched on the map near the path (hybrid A*: Dolgov, Thrun, Montemerlo and
 /// Diebel, 2010), with points a few centimetres apart, and at the end a heading with `look_at`
-/// before the lidar. None: there is no such curve, so that the goal has to be given up; or
+/// before the lidar. It backs where that is shorter by far, or where nothing else leads on (a car
+/// of Reeds and Shepp). None: there is no such curve, so that the goal has to be given up; or
 /// `interrupt`, if not null, has become true, which ends the search at once.
 CAIRN_API std::optional<PlannedPath> drivable_path(PlannedPath path, const Pose2& at,
                                                    const RobotModel& robot, const FloorMap& map,

@@ -11,7 +11,9 @@
 namespace cairn {
 
 /// The motions that `next_motion` makes of a path for a robot that carries them out exactly, each
-/// in the frame of the pose before: as many as there will be SLAM steps.
+/// in the frame of the pose before: as many as there will be SLAM steps. A path that a robot of
+/// `MotionModel::dubins` can't follow by steering, since its curve is not known yet, has those of a
+/// robot that turns in place.
 CAIRN_API std::vector<Pose2> motions_along(const Pose2& from, const PlannedPath& path,
                                            const RobotModel& robot);
 
