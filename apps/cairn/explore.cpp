@@ -398,7 +398,10 @@ Command add_explore(ArgumentParser program) {
                  "decides where to drive; options as NAME:k=v; several, A,B, are compared")
       .components({"explorer"})
       .show_default();
-  cli.add_option("--until", options->until, "limits: distance=250 [m], steps=N, decisions=N")
+  cli.add_option(
+         "--until", options->until,
+         "limits: distance=250 [m], steps=N, decisions=N, known=0.99 of what the body can cover, "
+         "rate=0.5 [m²/m] that the last 20 m brought")
       .type_name("K=V,…");
   add_comparison_options(cli, options->comparison);
   cli.add_option(

@@ -84,6 +84,7 @@ json::object report_json(const ExploreOutcome& outcome) {
   report["loss"] = outcome.parts.loss;
   report["seed"] = outcome.parts.seed;
   report["repeatable"] = outcome.repeatable;
+  if (result.start) report["start"] = {result.start->x(), result.start->y(), result.start->theta()};
   report["end"] = std::string(to_string(result.end));
   report["why"] = result.why;
   report["motions"] = last.step;
@@ -143,8 +144,10 @@ std::string summary_text(const ExploreOutcome& outcome) {
   if (result.against) {
     const MapTruth& truth = *result.against;
     map += truth.floor > 0.0
-               ? fmt::format(", {:.1f} % of the {:.1f} m² that hang together with the start",
-                             100.0 * truth.seen / truth.floor, truth.floor)
+               ? fmt::format(
+                     ", {:.1f} m² ({:.1f} %) of the {:.1f} m² that hang together with the "
+                     "start",
+                     truth.seen, 100.0 * truth.seen / truth.floor, truth.floor)
                : ", the start is not on free floor";
     if (truth.reachable_seen)
       map += fmt::format(", {:.1f} % of what the body can cover", 100.0 * *truth.reachable_seen);

@@ -40,9 +40,8 @@ OptionValues limit_words(const std::string& words) {
   try {
     return parse_component("until:" + words).values;
   } catch (const Error&) {
-    throw Error(
-        ErrorCode::usage,
-        fmt::format("--until: '{}' is not of the form distance=250,steps=N,decisions=N", words));
+    throw Error(ErrorCode::usage,
+                fmt::format("--until: '{}' is not of the form distance=250,known=0.99", words));
   }
 }
 
@@ -58,11 +57,21 @@ ExplorationLimits limits_of(const std::string& words) {
       limits.steps = count("--until", key, text);
     } else if (key == "decisions") {
       limits.decisions = count("--until", key, text);
+    } else if (key == "known") {
+      limits.known = positive("--until", key, text);
+      if (limits.known > 1.0)
+        throw Error(ErrorCode::usage,
+                    fmt::format("--until: known is a part of what the body can cover, 0.99 for "
+                                "instance, and '{}' is more than all of it",
+                                text));
+    } else if (key == "rate") {
+      limits.rate = positive("--until", key, text);
     } else {
       throw Error(ErrorCode::usage,
-                  fmt::format("--until: there is no limit '{}'; there are distance [m], steps and "
-                              "decisions",
-                              key));
+                  fmt::format("--until: there is no limit '{}'; there are distance [m], steps, "
+                              "decisions, known (part of what the body can cover) and rate (what "
+                              "the last {:.0f} m brought [m²/m])",
+                              key, ExplorationLimits::kRateDistance));
     }
   }
   return limits;

@@ -55,7 +55,8 @@ struct LidarBuildingOptions {
         .real("turn", &O::turn, 0.01, 3.14, "most that it turns between two scans [rad]")
         .choice("motion", &O::motion,
                 "differential: turns in place, then drives ahead; holonomic: drives in any "
-                "direction at once; dubins: drives ahead along arcs and can't turn in place")
+                "direction at once; dubins: drives ahead along arcs, or back, and can't turn in "
+                "place")
         .real("turning_radius", &O::turning_radius, 0.01, 100.0,
               "least one, with motion=dubins [m]")
         .component<FloorSurveyor>("surveyor", &O::surveyor, "finds the start, or checks it");
@@ -100,7 +101,9 @@ class LidarBuilding final : public World {
     rays_.emplace(floor_);
     odometry_noise_.emplace(start.seed, RandomStream::Purpose::odometry);
     lidar_noise_.emplace(start.seed, RandomStream::Purpose::lidar);
-    truth_ = start.pose.value_or(Pose2(found.start.x(), found.start.y(), 0.0));
+    const double heading = RandomStream(start.seed, RandomStream::Purpose::start)
+                               .uniform(-std::numbers::pi, std::numbers::pi);
+    truth_ = start.pose.value_or(Pose2(found.start.x(), found.start.y(), heading));
     return scan();
   }
 
@@ -152,16 +155,18 @@ class LidarBuilding final : public World {
     return scan;
   }
 
-  /// Of the arc that a robot which can't turn in place drives; none: the motion is a straight one.
+  /// Of the arc that a robot which can't turn in place drives, ahead or back; none: the motion is a
+  /// straight one.
   std::optional<double> curvature_of(const Pose2& motion) const {
     if (model_.motion != MotionModel::dubins) return std::nullopt;
     const double chord = motion.translation().norm(), turn = motion.theta();
     const bool is_straight = std::abs(motion.y()) <= kStraight * chord;
     if (is_straight && std::abs(turn) <= kStraight) return std::nullopt;  // ahead or back
-    const double aside = 2.0 * std::atan2(motion.y(), motion.x());
     const double curvature = chord > 0.0 ? 2.0 * motion.y() / (chord * chord) : 0.0;
     constexpr double kSlack = 1e-6;
-    if (!(chord > 0.0) || std::abs(aside - turn) > kSlack ||
+    const auto turns_by = [&](double aside) { return std::abs(2.0 * aside - turn) <= kSlack; };
+    const bool is_ahead = turns_by(std::atan2(motion.y(), motion.x()));
+    if (!(chord > 0.0) || !(is_ahead || turns_by(std::atan2(-motion.y(), -motion.x()))) ||
         std::abs(curvature) * model_.turning_radius > 1.0 + kSlack) {
       throw Error(ErrorCode::usage,
                   fmt::format("world lidar_building: with motion=dubins the robot can't make the "
@@ -183,7 +188,7 @@ class LidarBuilding final : public World {
   /// The same of a motion of this length [m], `at` of which is a point for each part [m].
   template <class At>
   double free_part(double length, At&& at) const {
-    return free_part_of(length / floor_.frame.resolution,
+    return free_part_of(std::abs(length) / floor_.frame.resolution,
                         floor_.frame.to_cells(truth_.translation()),
                         [&](double part) -> Vector2d { return floor_.frame.to_cells(at(part)); });
   }

@@ -240,7 +240,7 @@ class TreeExplorer : public Explorer {
     discovery_.expect({}, 2.0);
     const std::vector<Frontier>& frontiers = situation.map.frontiers;
     if (!fallback_) {
-      searched.kind = Decision::Kind::finished;
+      searched.kind = frontiers.empty() ? Decision::Kind::finished : Decision::Kind::stuck;
       searched.why = fmt::format("{}; {} frontiers are left", why, frontiers.size());
       if (!frontiers.empty())
         searched.why += fmt::format(", the longest of {:.1f} m", frontiers.front().length);

@@ -822,6 +822,8 @@ class ExplorationResult:
     @property
     def why(self) -> str: ...
     @property
+    def start(self) -> Optional[Pose2]: ...
+    @property
     def steps(self) -> Dict[str, npt.NDArray[Any]]: ...
     @property
     def graph(self) -> Graph: ...
@@ -849,6 +851,8 @@ def explore(
     max_distance: Optional[float] = ...,
     max_steps: Optional[int] = ...,
     max_decisions: Optional[int] = ...,
+    max_known: Optional[float] = ...,
+    min_rate: Optional[float] = ...,
     world: str = ...,
     policy: str = ...,
     registration: str = ...,

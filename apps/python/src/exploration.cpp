@@ -59,6 +59,7 @@ void set_positive(const char* name, const std::optional<int>& value, int& out) {
 struct Limits {
   std::optional<double> distance;
   std::optional<int> steps, decisions;
+  std::optional<double> known, rate;
 };
 
 ExplorationLimits limits_of(const Limits& given) {
@@ -66,6 +67,8 @@ ExplorationLimits limits_of(const Limits& given) {
   set_positive("max_distance", given.distance, limits.distance);
   set_positive("max_steps", given.steps, limits.steps);
   set_positive("max_decisions", given.decisions, limits.decisions);
+  set_positive("max_known", given.known, limits.known);
+  set_positive("min_rate", given.rate, limits.rate);
   return limits;
 }
 
@@ -109,25 +112,26 @@ std::unique_ptr<PythonExplorer> own_explorer(const py::object& explorer, const p
 std::unique_ptr<BoundExploration> explore(
     const py::object& given_floor, const py::object& explorer, std::uint64_t seed,
     const std::optional<Pose2>& start, std::optional<double> max_distance,
-    std::optional<int> max_steps, std::optional<int> max_decisions, const std::string& world,
-    const std::string& policy, const std::string& registration, const std::string& mapper,
-    std::optional<double> match_range, std::optional<double> match_angle,
-    std::optional<double> decision_budget, bool match_consecutive, const py::object& callback,
-    const py::kwargs& options) {
+    std::optional<int> max_steps, std::optional<int> max_decisions, std::optional<double> max_known,
+    std::optional<double> min_rate, const std::string& world, const std::string& policy,
+    const std::string& registration, const std::string& mapper, std::optional<double> match_range,
+    std::optional<double> match_angle, std::optional<double> decision_budget,
+    bool match_consecutive, const py::object& callback, const py::kwargs& options) {
   const OccupancyGrid floor = floor_of(given_floor);
   const InterruptGuard guard;
   Follower follower(callback, guard.flag());
   follower.follow();
-  ExplorationSetup setup{.registry = default_registry(),
-                         .world = parse_component(world),
-                         .policy = parse_component(policy),
-                         .registration = parse_component(registration),
-                         .mapper = parse_component(mapper),
-                         .floor = floor,
-                         .start = start,
-                         .limits = limits_of({max_distance, max_steps, max_decisions}),
-                         .interrupt = &follower.stop(),
-                         .match_consecutive = match_consecutive};
+  ExplorationSetup setup{
+      .registry = default_registry(),
+      .world = parse_component(world),
+      .policy = parse_component(policy),
+      .registration = parse_component(registration),
+      .mapper = parse_component(mapper),
+      .floor = floor,
+      .start = start,
+      .limits = limits_of({max_distance, max_steps, max_decisions, max_known, min_rate}),
+      .interrupt = &follower.stop(),
+      .match_consecutive = match_consecutive};
   refuse_recorded(setup.world, setup.registry);
   const std::vector<std::uint8_t> reachable = reachable_floor(setup);
   setup.reachable = reachable;
@@ -214,9 +218,13 @@ void bind_step(py::module_& module) {
   py::class_<Step>(module, "ExplorationStep", "A run after one motion.")
       .def_readonly("step", &Step::step, "How many motions there were.")
       .def_readonly("decision", &Step::decision, "How many decisions there were.")
-      .def_readonly("distance", &Step::distance, "Driven so far, as odometry has it [m].")
+      .def_readonly("distance", &Step::distance,
+                    "Driven so far [m]: as it truly was, else by odometry.")
       .def_readonly("estimate", &Step::estimate, "Where the robot is, as estimated: a Pose2.")
-      .def_readonly("truth", &Step::truth, "Where it truly is: a Pose2; None: that is not known.")
+      .def_readonly(
+          "truth", &Step::truth,
+          "Where it truly is, in the frame of the estimate, where both begin at one pose: a Pose2; "
+          "None: that is not known.")
       .def_readonly("coverage", &Step::coverage, "Of the cells that are known [m^2].")
       .def_readonly("map_entropy", &Step::map_entropy,
                     "Over the floor's grid or, where that is not known, the map's [nats m^2].")
@@ -240,6 +248,11 @@ void bind_result(py::module_& module) {
           "'finished', 'limit', 'stuck' or 'interrupted'.")
       .def_property_readonly(
           "why", [](const Bound& b) { return b.result.why; }, "A sentence.")
+      .def_property_readonly(
+          "start", [](const Bound& b) { return b.result.start; },
+          "Where the frame of the estimate lies on the floor, by the first true pose: a Pose2; "
+          "None: "
+          "that is not known.")
       .def_property_readonly("steps", &steps_of,
                              "An array for each quantity of ExplorationStep, of all steps: (n,), "
                              "and (n, 3) x y [m] theta [rad] for 'estimate' and 'truth' (NaN: not "
@@ -252,7 +265,8 @@ void bind_result(py::module_& module) {
           "All poses, without factors.")
       .def_property_readonly(
           "truth", [](const Bound& b) { return b.truth.get(); }, inside,
-          "Where they truly were; without variables if that is not known.")
+          "Where they truly were, in the frame of the floor; without variables if that is not "
+          "known.")
       .def_property_readonly(
           "map", [](const Bound& b) { return b.result.map.occupancy(); }, "The map: a Floor.")
       .def_property_readonly("measures", &measures,
@@ -281,6 +295,7 @@ void bind_exploration(py::module_& module) {
       "explore", &explore, py::arg("floor"), py::arg("explorer") = "frontier", py::kw_only(),
       py::arg("seed") = 1, py::arg("start") = py::none(), py::arg("max_distance") = py::none(),
       py::arg("max_steps") = py::none(), py::arg("max_decisions") = py::none(),
+      py::arg("max_known") = py::none(), py::arg("min_rate") = py::none(),
       py::arg("world") = ExplorationSetup::kWorld, py::arg("policy") = ExplorationSetup::kPolicy,
       py::arg("registration") = "icp", py::arg("mapper") = "log_odds",
       py::arg("match_range") = py::none(), py::arg("match_angle") = py::none(),
@@ -293,8 +308,10 @@ explorer: a name of `cairn.components("explorer")`, whose options are further ke
     decide(situation) that returns a Decision, or an object with such a method, and if it has them begin(seed), called before
     the first decision, and is_worthwhile(situation, path), called after each motion: False: it decides anew.
 seed: of all noise and random choices: the same seed gives the same run.
-start: the Pose2 at which it begins; None: the widest place.
-max_distance [m], max_steps, max_decisions: it ends there; None: when nothing is left to explore.
+start: the Pose2 at which it begins; None: the widest place, with a heading by the seed. The estimate begins at the identity
+    all the same: a robot does not know where on the floor it is.
+max_distance [m], max_steps, max_decisions, max_known (part of what the body can cover, 0 to 1), min_rate (what the last
+    20 m brought per metre [m^2/m]): it ends there; None: when nothing is left to explore.
 world, policy, registration, mapper: the robot, and what makes a graph and a map of its scans, with options:
     world="lidar_building:range=8,fov=180".
 match_range [m], match_angle [rad]: within which the explorer expects loop closures.

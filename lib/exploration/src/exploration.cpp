@@ -20,6 +20,7 @@
 #include "cairn/exploration/scan_clearance.hpp"
 #include "cairn/exploration/scan_slam.hpp"
 #include "cairn/grid/cell_traversal.hpp"
+#include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/timed.hpp"
 
@@ -94,6 +95,11 @@ class Run {
         contacts_(robot_.radius) {}
 
   ExplorationResult run() {
+    if (std::isfinite(parts_.limits.known) && parts_.reachable.empty())
+      throw Error(
+          ErrorCode::usage,
+          "a run ends by how much of the floor is known only where that floor, and what the "
+          "body can cover of it, is given");
     begin();
     if (recorded_)
       follow();
@@ -112,6 +118,7 @@ class Run {
         end_interrupted();
       } else if (decision->kind == Decision::Kind::drive) {
         drive(decision->candidates.at(decision->chosen).path);
+        retracing_ = false;
       } else if (!doubts_contacts()) {
         end(decision->kind == Decision::Kind::finished ? ExplorationEnd::finished
                                                        : ExplorationEnd::stuck,
@@ -133,9 +140,8 @@ class Run {
   void begin() {
     LaserScan scan = parts_.world.begin(parts_.start);
     const std::optional<Pose2> truth = parts_.world.truth();
-    const Pose2 start = truth.value_or(parts_.start.pose.value_or(Pose2()));
-    log(start, scan, truth);
-    slam_.begin(start, std::move(scan), robot_.odometry, Pose2(robot_.step, 0.0, 0.0), truth);
+    log(Pose2(), scan, truth);
+    slam_.begin(Pose2(), std::move(scan), robot_.odometry, Pose2(robot_.step, 0.0, 0.0), truth);
     parts_.explorer.begin(parts_.start.seed);
     record(0.0);
     if (recorded_) return;
@@ -174,7 +180,7 @@ class Run {
                          .decision = decisions_,
                          .distance = driven,
                          .estimate = slam_.pose(),
-                         .truth = parts_.world.truth(),
+                         .truth = truth_as_estimated(),
                          .coverage = map.coverage(),
                          .map_entropy = entropy_of_area(map.entropy(), area_of(map.frame), area),
                          .grid_area = area,
@@ -184,12 +190,22 @@ class Run {
                          .loops = slam_.counts().loops,
                          .collisions = result_.collisions};
     if (!result_.steps.empty()) step.distance += result_.steps.back().distance;
-    if (!first_truth_) first_truth_ = step.truth;
     watch_progress(step);
     result_.steps.push_back(step);
     sample_map();
     if (parts_.moved) parts_.moved(step, map);
     if (parts_.scanned) parts_.scanned(step, situation(map, kept), slam_.scans().back());
+  }
+
+  /// Where the robot truly is, in the frame of the estimate.
+  std::optional<Pose2> truth_as_estimated() {
+    const std::optional<Pose2> truth = parts_.world.truth();
+    if (!truth) return std::nullopt;
+    if (!result_.start) {
+      result_.start = *truth * slam_.pose().inverse();
+      first_truth_ = truth->translation();
+    }
+    return result_.start->between(*truth);
   }
 
   /// Every so many metres.
@@ -207,10 +223,10 @@ class Run {
                      .coverage = map.coverage(),
                      .error = contradicted_area(map, slam_.scans(), slam_.poses()),
                      .against = {}};
-    if (parts_.start.floor && first_truth_) {
+    if (parts_.start.floor && result_.start) {
       if (const std::optional<Pose2> to_floor = alignment(estimate))
-        sample.against = compare_with_floor(map, *parts_.start.floor, *to_floor,
-                                            first_truth_->translation(), parts_.reachable);
+        sample.against =
+            compare_with_floor(map, *parts_.start.floor, *to_floor, first_truth_, parts_.reachable);
     }
     return sample;
   }
@@ -238,9 +254,33 @@ class Run {
     } else if (decisions_ >= limits.decisions) {
       end(ExplorationEnd::limit, fmt::format("{} decisions are made", limits.decisions));
     } else if (!recorded_) {
-      check_progress();
+      check_discoveries();
+      if (!ended_) check_progress();
     }
     return !ended_;
+  }
+
+  void check_discoveries() {
+    const ExplorationLimits& limits = parts_.limits;
+    const ExplorationStep& last = result_.steps.back();
+    constexpr double kBetweenLooks = 2.0;  // [m]
+    if (std::isfinite(limits.known) && last.distance >= next_look_) {
+      next_look_ = last.distance + kBetweenLooks;
+      const MapSample sample =
+          map_sample(recovered_trajectory(parts_.policy, Recovery::distribute));
+      const double seen = sample.against ? sample.against->reachable_seen.value_or(0.0) : 0.0;
+      if (seen >= limits.known)
+        return end(ExplorationEnd::limit,
+                   fmt::format("{:.1f} % of what the body can cover is seen", 100.0 * seen));
+    }
+    const double from = last.distance - ExplorationLimits::kRateDistance;
+    if (!(limits.rate > 0.0) || from < 0.0) return;
+    while (result_.steps[rate_from_ + 1].distance <= from) ++rate_from_;
+    const ExplorationStep& before = result_.steps[rate_from_];
+    const double rate = (last.coverage - before.coverage) / (last.distance - before.distance);
+    if (rate < limits.rate)
+      end(ExplorationEnd::limit, fmt::format("the last {:.0f} m brought {:.2f} m² of floor a metre",
+                                             ExplorationLimits::kRateDistance, rate));
   }
 
   void check_progress() {
@@ -317,8 +357,28 @@ class Run {
     }
     if (order.empty()) return;
     doubts_contacts();
-    decision.why += "; it can't follow that path, nor another";
-    decision.candidates[wanted].path = {};
+    decision.why += "; it can't follow that path, nor another: it goes back the way it came";
+    decision.candidates[wanted].path = way_back();
+    retracing_ = true;
+  }
+
+  /// Where the robot has driven it can drive, the other way round. Empty: it is back at its start.
+  PlannedPath way_back() const {
+    constexpr double kLength = 1.0;  // [m]
+    const std::span<const Pose2> poses = slam_.poses();
+    PlannedPath path{.points = {slam_.pose().translation()}};
+    double way = 1.0;
+    for (std::size_t k = trail_.size(); k > 0 && path.length < kLength; --k) {
+      const Pose2 from = poses[trail_[k - 1]];
+      const Pose2 motion = from.between(k < trail_.size() ? poses[trail_[k]] : slam_.pose());
+      const double back = motion.x() < 0.0 ? 1.0 : -1.0;
+      if (std::exchange(way, back) != back) path.cusps.push_back(path.points.size() - 1);
+      constexpr int kParts = 4;
+      for (int part = kParts; part-- > 0;)
+        path.points.push_back(from.retract(motion.log() * (double(part) / kParts)).translation());
+      path.length += motion.translation().norm();
+    }
+    return path;
   }
 
   Situation situation(const FloorMap& map, std::span<const Id> kept) {
@@ -334,6 +394,16 @@ class Run {
             .first_sigma = parts_.first_sigma,
             .budget = parts_.decision_budget,
             .interrupt = parts_.interrupt};
+  }
+
+  /// The scans from which the robot has driven on; on its way back they are taken off again.
+  void note_trail(double driven) {
+    if (driven < kNoMotion) return;
+    if (!retracing_) {
+      trail_.push_back(slam_.poses().size() - 2);
+    } else if (!trail_.empty()) {
+      trail_.pop_back();
+    }
   }
 
   void drive(const PlannedPath& path) {
@@ -417,7 +487,7 @@ class Run {
 
   /// Whether the rest of a path can be driven, and is worth it.
   bool goes_on(const PlannedPath& path, std::size_t passed) {
-    const FloorMap& map = slam_.map();
+    const FloorMap& map = contacts_.seen_by(slam_.map(), result_.steps.back().distance);
     const double radius = path.radius > 0.0 ? path.radius : robot_.radius;
     if (!is_open(map, slam_.pose(), path, passed, radius)) return false;
     const std::vector<Id> kept = parts_.policy.kept();
@@ -428,16 +498,22 @@ class Run {
 
   /// False: a new decision is needed.
   bool move(const Pose2& motion) {
+    const std::optional<Pose2> from = parts_.world.truth();
     WorldStep step = parts_.world.move(motion);
     result_.collisions += step.collided;
-    const double driven = step.odometry.translation().norm();
-    const bool idle = std::max(driven, std::abs(step.odometry.theta())) < kNoMotion;
+    const std::optional<Pose2> to = parts_.world.truth();
+    // Odometry that is noisy adds up to more than was driven.
+    const Pose2 moved = from && to ? from->between(*to) : step.odometry;
+    const double driven = moved.translation().norm();
+    const bool idle = std::max(driven, std::abs(moved.theta())) < kNoMotion;
     idle_ = idle ? idle_ + 1 : 0;
     if (!step.collided && !backing_off_ && driven > robot_.radius) collisions_in_row_ = 0;
     if (parts_.log && !parts_.log->scans.empty())
-      log(parts_.log->scans.back().odometry * step.odometry, step.scan, parts_.world.truth());
+      log(parts_.log->scans.back().odometry * step.odometry, step.scan, to);
     const Pose2 expected = slam_.pose() * step.odometry;
-    slam_.add(step.odometry, step.covariance, std::move(step.scan), parts_.world.truth());
+    slam_.add(step.odometry, step.covariance, std::move(step.scan), to);
+    watch_matches(driven);
+    note_trail(driven);
     record(driven);
     const double jump = (slam_.pose().translation() - expected.translation()).norm();
     if (jump > slam_.map().frame.resolution) contacts_.forget();  // they were in another frame
@@ -447,6 +523,13 @@ class Run {
       back_off();
     }
     return !step.collided && jump <= slam_.map().frame.resolution;
+  }
+
+  /// How far the robot drives between two scans that are matched with another one.
+  void watch_matches(double driven) {
+    const int matched = slam_.counts().consecutive + slam_.counts().loops;
+    unmatched_ = matched > std::exchange(matched_, matched) ? 0.0 : unmatched_ + driven;
+    longest_unmatched_ = std::max(longest_unmatched_, unmatched_);
   }
 
   /// What was touched may be all that is in the way, but not again where nothing else was tried.
@@ -489,6 +572,7 @@ class Run {
           not_driven_, robot_.turning_radius));
     }
     for (const std::string& note : slam_.counts().notes) note_once(note);
+    note_odometry_alone();
     note_refused_matches();
     result_.map = slam_.map();
     result_.slam = slam_.counts();
@@ -498,6 +582,29 @@ class Run {
     result_.samples.push_back(map_sample(result_.trajectory));
     result_.map_error = result_.samples.back().error;
     result_.against = result_.samples.back().against;
+    note_unfinished();
+  }
+
+  /// What an explorer takes for all that can be reached may be less, as a simulation knows.
+  void note_unfinished() {
+    constexpr double kNearlyAll = 0.95;
+    if (result_.end != ExplorationEnd::finished || recorded_ || !result_.against) return;
+    const double seen = result_.against->reachable_seen.value_or(1.0);
+    if (seen < kNearlyAll)
+      note_once(
+          fmt::format("nothing was left that it could reach, but it has seen {:.0f} % of what "
+                      "its body could cover",
+                      100.0 * seen));
+  }
+
+  /// Where no scan is matched the map bends as odometry drifts, and nothing else shows that.
+  void note_odometry_alone() {
+    constexpr double kFar = 20.0;  // [m]
+    if (longest_unmatched_ < kFar) return;
+    note_once(fmt::format(
+        "it drove {:.0f} m by odometry alone, without a scan that was matched "
+        "with another one: there the map may be bent{}",
+        longest_unmatched_, parts_.match_consecutive ? "" : "; scans in a row are not matched"));
   }
 
   /// Where the registration refuses nearly all pairs, and has matched few scans, the map rests on
@@ -507,7 +614,8 @@ class Run {
     constexpr double kFew = 0.15, kFewOfScans = 0.1;
     const ScanSlamCounts& counts = slam_.counts();
     if (counts.proposed < kEnoughToTell || counts.registered >= kFew * counts.proposed ||
-        counts.registered >= kFewOfScans * static_cast<double>(result_.steps.size()))
+        counts.registered + counts.consecutive >=
+            kFewOfScans * static_cast<double>(result_.steps.size()))
       return;
     note_once(fmt::format(
         "of {} pairs of scans that were to be matched, the registration has refused {}: the map "
@@ -520,8 +628,8 @@ class Run {
     constexpr int kFewest = 3;  // poses that determine one
     const auto known = slam_.truth().variable_count();
     if (known < kFewest) {
-      // A run that has just begun did so at the true pose.
-      return known == estimate.variable_count() ? std::optional(Pose2()) : std::nullopt;
+      // Of a run that has just begun the first pose does.
+      return known == estimate.variable_count() ? result_.start : std::nullopt;
     }
     const Pose pose = align(pair_by_id(trajectory(estimate), trajectory(slam_.truth())));
     return Pose2(pose.t.x(), pose.t.y(), std::atan2(pose.R(1, 0), pose.R(0, 0)));
@@ -533,11 +641,17 @@ class Run {
   ScanSlam slam_;
   Contacts contacts_;
   ExplorationResult result_;
-  std::optional<Pose2> first_truth_;  // of the poses of which it is known
+  Eigen::Vector2d first_truth_ = Eigen::Vector2d::Zero();  // position [m], with `result_.start`
   bool ended_ = false, backing_off_ = false;
   double next_doubt_ = 0.0;  // of contacts, so as to go on, no earlier [m driven]
   int not_driven_ = 0;       // paths
+  bool retracing_ = false;   // what it has driven: `trail_`, of scans
+  std::vector<std::size_t> trail_;
   int decisions_ = 0, empty_decisions_ = 0, refused_paths_ = 0, idle_ = 0, collisions_in_row_ = 0;
+  double next_look_ = 0.0;                            // at what is known, no earlier [m driven]
+  std::size_t rate_from_ = 0;                         // the step that many metres ago
+  int matched_ = 0;                                   // scans, with one before
+  double unmatched_ = 0.0, longest_unmatched_ = 0.0;  // driven between two of them [m]
   DiscoveredFloor discovered_;
   // What counts as driven without progress; where the newest way began, and progress ended [m].
   double idle_distance_ = 0.0, way_begin_ = 0.0, useful_distance_ = 0.0;

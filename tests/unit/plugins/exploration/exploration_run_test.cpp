@@ -160,6 +160,102 @@ TEST(Exploration, LimitsEndARun) {
   EXPECT_EQ(run({.decisions = 2}).decision_seconds.size(), 2U);
 }
 
+TEST(Exploration, EndsOnceEnoughIsKnown) {
+  const OccupancyGrid floor = floor_named("rooms:width=12,height=9", 5);
+  ExplorationParts parts(kNoisyRobot);
+  const FloorSurvey survey = parts.make<FloorSurveyor>("round_body")
+                                 ->survey(floor, {.radius = parts.world->robot().radius});
+  Exploration exploration = parts.on(floor);
+  exploration.limits.known = 0.6;
+  EXPECT_THROW(run_exploration(exploration), Error);  // of what?
+  exploration.reachable = survey.covered;
+  const ExplorationResult result = run_exploration(exploration);
+  EXPECT_EQ(result.end, ExplorationEnd::limit);
+  EXPECT_THAT(result.why, HasSubstr("of what the body can cover is seen"));
+  EXPECT_GE(*result.against->reachable_seen, 0.6 - 0.02);  // aligned anew at the end
+  EXPECT_LT(*result.against->reachable_seen, 0.99);
+}
+
+TEST(Exploration, EndsOnceTheLastMetresBringLittle) {
+  const OccupancyGrid floor = floor_named("rooms:width=12,height=9", 5);
+  ExplorationParts parts(kNoisyRobot);
+  Exploration exploration = parts.on(floor);
+  exploration.limits = {.distance = 200.0, .rate = 2.0};
+  const ExplorationResult result = run_exploration(exploration);
+  EXPECT_EQ(result.end, ExplorationEnd::limit) << result.why;
+  EXPECT_THAT(result.why, HasSubstr("the last 20 m brought"));
+  const ExplorationStep& last = result.steps.back();
+  const auto before =
+      std::find_if(result.steps.rbegin(), result.steps.rend(), [&](const auto& step) {
+        return step.distance <= last.distance - ExplorationLimits::kRateDistance;
+      });
+  ASSERT_NE(before, result.steps.rend());
+  EXPECT_LT(last.coverage - before->coverage, 2.0 * (last.distance - before->distance));
+}
+
+/// The robot does not know where on the floor it is; estimate and truth begin at one pose.
+TEST(Exploration, BeginsAtAnUnknownPlaceAndAngle) {
+  const OccupancyGrid floor = floor_named("rooms:width=12,height=9", 5);
+  std::vector<double> headings;
+  for (const std::uint64_t seed : {3U, 3U, 4U}) {
+    ExplorationParts parts(kExactRobot);
+    Exploration exploration = parts.on(floor, seed);
+    exploration.limits.distance = 10.0;
+    const ExplorationResult result = run_exploration(exploration);
+    ASSERT_TRUE(result.start);
+    headings.push_back(result.start->theta());
+    EXPECT_EQ(result.steps.front().estimate.state(), Pose2().state());
+    EXPECT_EQ(result.steps.front().truth->state(), Pose2().state());
+    // What is drawn at an angle is compared at that angle.
+    EXPECT_LT(result.steps.back().estimate.between(*result.steps.back().truth).log().norm(), 0.01);
+    EXPECT_LE(result.against->free_wrong + result.against->occupied_wrong, 0.5);
+    EXPECT_GT(result.against->seen, 10.0);
+  }
+  EXPECT_EQ(headings[0], headings[1]);
+  EXPECT_NE(headings[0], headings[2]);
+  ExplorationParts parts(kExactRobot);
+  Exploration exploration = parts.on(floor);
+  exploration.limits.steps = 1;
+  exploration.start.pose = Pose2(2.0, 2.5, 1.0);
+  EXPECT_LT(run_exploration(exploration).start->local(*exploration.start.pose).norm(), 1e-12);
+}
+
+/// Noise of odometry adds up to metres that nobody has driven.
+TEST(Exploration, CountsWhatItHasTrulyDriven) {
+  const OccupancyGrid floor = floor_named("rooms:width=12,height=9", 5);
+  ExplorationParts parts("lidar_building:sigma_xy=0.1");
+  Exploration exploration = parts.on(floor);
+  exploration.limits.steps = 60;
+  const ExplorationResult result = run_exploration(exploration);
+  double driven = 0.0;
+  for (std::size_t k = 1; k < result.steps.size(); ++k) {
+    const Pose2& before = *result.steps[k - 1].truth;
+    driven += before.between(*result.steps[k].truth).translation().norm();
+    EXPECT_NEAR(result.steps[k].distance, driven, 1e-9);
+  }
+}
+
+/// Matches no scan.
+class NoRegistration final : public Registration {
+ public:
+  void begin(const RegistrationData&) override {}
+  std::vector<Factor> match(Id, Id) override { return {}; }
+};
+
+TEST(Exploration, SaysHowFarItDroveByOdometryAlone) {
+  const OccupancyGrid floor = floor_named("rooms:width=12,height=9", 5);
+  for (const bool matched : {true, false}) {
+    ExplorationParts parts(kNoisyRobot);
+    if (!matched) parts.registration = std::make_unique<NoRegistration>();
+    Exploration exploration = parts.on(floor);
+    exploration.match_consecutive = true;
+    exploration.limits.distance = 25.0;
+    const ExplorationResult result = run_exploration(exploration);
+    EXPECT_THAT(result.notes,
+                testing::Contains(HasSubstr("25 m by odometry alone")).Times(matched ? 0 : 1));
+  }
+}
+
 TEST(Exploration, AnInterruptEndsItWithItsResults) {
   const OccupancyGrid floor = floor_named("rooms:width=12,height=9", 5);
   ExplorationParts parts(kNoisyRobot);

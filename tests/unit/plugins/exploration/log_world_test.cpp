@@ -96,7 +96,8 @@ TEST_F(LogWorldTest, TheRobotGoesWhereItWent) {
     EXPECT_LT((step.odometry.state() - odometry.state()).norm(), 1e-12);
     EXPECT_EQ(step.scan.ranges, log_.scans[k].scan.ranges);
     ASSERT_TRUE(world->truth());
-    EXPECT_EQ(world->truth()->state(), run_.steps[k].truth->state());
+    const Pose2 truth = *run_.start * *run_.steps[k].truth;
+    EXPECT_LT(truth.local(*world->truth()).norm(), 1e-9);
   }
   EXPECT_TRUE(recorded->has_ended());
   EXPECT_THROW(world->move(Pose2()), Error);
@@ -121,7 +122,7 @@ TEST_F(LogWorldTest, ARunOfItHasTheSameMapAndAsksNoExplorer) {
   for (std::size_t k = 0; k < again.steps.size(); ++k) {
     const Pose2 apart = again.steps[k].estimate.between(run_.steps[k].estimate);
     EXPECT_LT(apart.translation().norm(), 0.02);  // odometry is off by ten times as much
-    EXPECT_EQ(again.steps[k].truth->state(), run_.steps[k].truth->state());
+    EXPECT_LT(again.steps[k].truth->local(*run_.steps[k].truth).norm(), 1e-9);
   }
 }
 
@@ -134,8 +135,9 @@ TEST_F(LogWorldTest, ScansAreTakenAfterAStepOrATurn) {
   EXPECT_LT(coarse.steps.size(), run_.steps.size() / 2);
   EXPECT_GT(coarse.steps.size(), 6U);
   EXPECT_FALSE(coarse.against);
+  // By odometry, which is off by hundredths of a motion.
   for (std::size_t k = 1; k < coarse.steps.size(); ++k)
-    EXPECT_GE(coarse.steps[k].distance - coarse.steps[k - 1].distance, 1.0 - 1e-9);
+    EXPECT_GE(coarse.steps[k].distance - coarse.steps[k - 1].distance, 0.9);
   ExplorationParts others(named(""));
   Exploration short_run = others.on(floor_);
   short_run.limits.steps = 3;

@@ -88,7 +88,8 @@ TEST_P(TreeExplorers, ListCandidatesWithExactValues) {
       with_loops += path.loops() > 0;
       EXPECT_NEAR(candidate.change->trajectory, path.trajectory_change(), 1e-9);
     }
-    ASSERT_TRUE(std::ranges::is_sorted(decision.candidates, {}, &Candidate::value));
+    const bool by_fallback = decision.why.find("; frontier: ") != std::string::npos;
+    EXPECT_TRUE(by_fallback || std::ranges::is_sorted(decision.candidates, {}, &Candidate::value));
   };
   run_exploration(exploration);
   EXPECT_GT(with_loops, 5);
@@ -162,7 +163,7 @@ TEST_P(TreeExplorers, EndWithAReasonWhereNothingIsToBeGained) {
   ExplorationParts parts(kExactRobot,
                          std::string(GetParam()) + ":fallback=none,density=1,least_gain=1e6");
   const ExplorationResult result = run_exploration(parts.on(floor));
-  EXPECT_EQ(result.end, ExplorationEnd::finished);
+  EXPECT_EQ(result.end, ExplorationEnd::stuck);  // it is not finished
   EXPECT_THAT(result.why, HasSubstr("lowers the entropy by 1e+06 nats/m"));
   EXPECT_THAT(result.why, HasSubstr("frontiers are left"));
   // With another explorer to fall back on it is that explorer that drives.

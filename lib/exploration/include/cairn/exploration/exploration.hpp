@@ -31,6 +31,12 @@ struct ExplorationLimits {
   double distance = std::numeric_limits<double>::infinity();  ///< driven [m]
   int steps = std::numeric_limits<int>::max();                ///< motions
   int decisions = std::numeric_limits<int>::max();
+  /// Part of what the body can cover that is seen (`MapTruth::reachable_seen`), looked at every
+  /// 2 m: only where the floor is known (`Exploration::reachable`).
+  double known = std::numeric_limits<double>::infinity();
+  /// Floor that the last `kRateDistance` metres brought per metre [m²/m]: less ends the run.
+  double rate = 0.0;
+  static constexpr double kRateDistance = 20.0;
   /// Driven without a discovery (`DiscoveredFloor`) [m]: then it is stuck. Of the way of each
   /// decision a fifth of this counts at most.
   double idle_distance = 50.0;
@@ -43,8 +49,10 @@ CAIRN_API std::string_view to_string(ExplorationEnd end);
 /// A run after one motion; the first is of its start.
 struct ExplorationStep {
   int step = 0, decision = 0;
-  double distance = 0.0;  ///< driven so far, as odometry has it [m]
+  /// Driven so far [m]: as it truly was, where that is known, else by odometry.
+  double distance = 0.0;
   Pose2 estimate;
+  /// In the frame of the estimate: both begin at the same pose.
   std::optional<Pose2> truth;
   double coverage = 0.0;            ///< `FloorMap::coverage` [m²]
   double map_entropy = 0.0;         ///< (5.6), over `grid_area` [nats·m²]
@@ -68,9 +76,12 @@ struct ExplorationResult {
   std::vector<MapSample> samples;  ///< as `Exploration::sample_distance` asks for, and of the end
   std::vector<double> decision_seconds;
   std::vector<std::string> notes;
-  Graph graph;             ///< of the poses that are kept
-  Graph trajectory;        ///< of all poses, without factors
-  Graph truth_trajectory;  ///< of all poses; without variables if it is not known
+  Graph graph;       ///< of the poses that are kept
+  Graph trajectory;  ///< of all poses, without factors
+  /// Where the estimate's frame lies in that of the world, by the first true pose; none: not known.
+  std::optional<Pose2> start;
+  /// Of all poses, in the frame of the world; without variables if it is not known.
+  Graph truth_trajectory;
   FloorMap map;
   double map_error = 0.0;           ///< `contradicted_area` [m²]
   std::optional<MapTruth> against;  ///< beside the floor, where that is known
@@ -124,6 +135,9 @@ struct Exploration {
 ///
 /// A world that is `RecordedWorld` goes where it went, until its recording ends, and the explorer
 /// is not asked.
+///
+/// The frame of the estimate is that of the robot where it begins: it does not know where it is on
+/// a floor, nor at which angle.
 ///
 /// Each motion is a pose of the graph with a relative factor from odometry; the policy decides
 /// which are kept and which are registered with each other (thesis, 5.1). Throws `Error` as its

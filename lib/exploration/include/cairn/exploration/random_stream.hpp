@@ -11,7 +11,7 @@ namespace cairn {
 /// that methods that are compared at one seed meet the same noise.
 class RandomStream : public RandomNumbers {
  public:
-  enum class Purpose : std::uint64_t { odometry = 1, lidar, explorer };
+  enum class Purpose : std::uint64_t { odometry = 1, lidar, explorer, start };
 
   RandomStream(std::uint64_t seed, Purpose purpose)
       : RandomNumbers(mixed(mixed(seed) + static_cast<std::uint64_t>(purpose))) {}

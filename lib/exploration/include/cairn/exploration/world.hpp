@@ -37,7 +37,9 @@ struct OdometryModel {
 enum class MotionModel {
   differential,  ///< turns in place, and drives straight ahead
   holonomic,     ///< drives in any direction at once, and turns on the way
-  dubins         ///< drives ahead, straight or along arcs, and can't turn in place
+  /// Drives ahead, straight or along arcs, and can't turn in place; where there is no other way it
+  /// backs.
+  dubins
 };
 constexpr auto enum_names(MotionModel) {
   return std::to_array<EnumName<MotionModel>>({{MotionModel::differential, "differential"},
@@ -59,8 +61,9 @@ struct RobotModel {
 /// Where a run begins.
 struct WorldStart {
   const OccupancyGrid* floor = nullptr;  ///< to drive on; a robot that is not simulated has its own
-  std::optional<Pose2> pose = {};        ///< in the frame of the floor; none: the world chooses
-  std::uint64_t seed = 1;                ///< of all noise
+  /// In the frame of the floor; none: the world chooses, the heading by the seed.
+  std::optional<Pose2> pose = {};
+  std::uint64_t seed = 1;  ///< of all noise
 };
 
 /// What follows a motion.
@@ -86,9 +89,9 @@ class CAIRN_API World : public Component {
   /// needs, (input) for a start where its body does not fit.
   virtual LaserScan begin(const WorldStart& start) = 0;
   /// Moves straight to `motion`, in the frame of where the robot truly is, turning on the way; a
-  /// robot of `MotionModel::dubins` along the arc that leads there, or straight back after a
-  /// collision, or before one. It stops where its body would touch an obstacle. Throws `Error`
-  /// (usage) for a motion that such a robot can't make.
+  /// robot of `MotionModel::dubins` along the arc that leads there, ahead or back. It stops where
+  /// its body would touch an obstacle. Throws `Error` (usage) for a motion that such a robot can't
+  /// make.
   virtual WorldStep move(const Pose2& motion) = 0;
   /// Where the robot truly is, in the frame of the floor; none: that is not known.
   virtual std::optional<Pose2> truth() const = 0;
