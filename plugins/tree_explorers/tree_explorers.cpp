@@ -289,6 +289,7 @@ class ErrtStar final : public TreeExplorer {
               const std::atomic<bool>* interrupt) override {
     RrtStar<PathValue> tree(space, value, tree_options());
     const bool grown = tree.grow(*random_, options_.density, kTreePart * budget, interrupt);
+    if (interrupt && interrupt->load(std::memory_order_relaxed)) return {};
     Search search = nodes_of(tree);
     for (const auto& node : tree.nodes()) search.values.emplace_back(node.state);
     search.complete = grown;

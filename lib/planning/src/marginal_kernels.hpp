@@ -41,8 +41,28 @@ struct PartnerUpdate {
 /// D = L⁻¹ (innovation − Σ_b L_b D_b), S −= Dᵀ D, K −= Z_kᵀ D, of all partners.
 using UpdatePartners = void (*)(const PartnerUpdate&);
 
+/// What a loop closure on a path does to the stretches of the path between its closures (see
+/// `PathClosure`). Blocks of `kStretches` of them, each block entry by entry.
+struct StretchUpdate {
+  static constexpr int kStretches = 8;
+  int closures;                   ///< before this one; there is one stretch more
+  const double* const* Z_before;  ///< of each, blocks of 18 entries
+  const double* ends;             ///< of each, Z of the poses behind it, by columns
+  const double* coupling;         ///< of each, a 3×3 matrix L_b by columns
+  const double* inverse;          ///< L⁻¹, by columns; its upper triangle is not read
+  const double* innovation;       ///< cov(y, ε) of the stretches' first poses, blocks of 9 entries
+  double* Z;                      ///< blocks of 18 entries
+  double* marginals;              ///< blocks of 21 entries, which change
+};
+
+/// Z = L⁻¹ (cov(y, ε) − Σ_b L_b Z_b) of the first pose of each stretch, and Z₁ = L⁻¹ (1 − Σ_b L_b
+/// Z₁,b) with b ahead of the stretch alone: by what noise on it changes y. Of the marginals
+/// Σ' −= Zᵀ Z (lower triangle), Q += Z₁ᵀ Z, T += Z₁ᵀ Z₁ (lower triangle).
+using UpdateStretches = void (*)(const StretchUpdate&);
+
 /// The fastest that this machine can run: compiled for AVX-512, for AVX2 with FMA, or portable.
 UpdateMarginals choose_marginal_kernel();
 UpdatePartners choose_partner_kernel();
+UpdateStretches choose_stretch_kernel();
 
 }  // namespace cairn

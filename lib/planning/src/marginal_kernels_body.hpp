@@ -123,6 +123,64 @@ inline __attribute__((always_inline)) void update_some_partners(const PartnerUpd
   }
 }
 
+/// y −= L Z, of 3×3 matrices by columns.
+inline __attribute__((always_inline)) void subtract_product(const double* L, const double* Z,
+                                                            long stride, Vec* y) {
+  for (int c = 0; c < 9; c += 3) {
+    const Vec z0 = load(Z + c * stride), z1 = load(Z + (c + 1) * stride),
+              z2 = load(Z + (c + 2) * stride);
+    for (int r = 0; r < 3; ++r) y[c + r] -= L[r] * z0 + L[3 + r] * z1 + L[6 + r] * z2;
+  }
+}
+
+/// L⁻¹ y
+inline __attribute__((always_inline)) void whiten(const double* inverse, const Vec* y, Vec* Z) {
+  for (int c = 0; c < 9; c += 3) {
+    Z[c] = inverse[0] * y[c];
+    Z[c + 1] = inverse[1] * y[c] + inverse[4] * y[c + 1];
+    Z[c + 2] = inverse[2] * y[c] + inverse[5] * y[c + 1] + inverse[8] * y[c + 2];
+  }
+}
+
+/// As many stretches of a block as a register has numbers, from `lane` on. `behind`: Σ_b L_b Z_b
+/// of the closures before the block.
+inline __attribute__((always_inline)) void update_some_stretches(const StretchUpdate& u, long block,
+                                                                 long lane, const double* behind) {
+  constexpr long kStride = StretchUpdate::kStretches;
+  Vec y[9], one[9];
+  for (int e = 0; e < 9; ++e) {
+    y[e] = load(u.innovation + (9 * block + e) * kStride + lane) - behind[e];
+    one[e] = Vec{} + (e % 4 == 0 ? 1.0 : 0.0);
+  }
+  const long at = 18 * block * kStride + lane;
+  for (long b = block * kStride; b < u.closures; ++b) {
+    const double* L = u.coupling + 9 * b;
+    subtract_product(L, u.Z_before[b] + at, kStride, y);
+    subtract_product(L, u.Z_before[b] + at + 9 * kStride, kStride, one);
+  }
+  Vec Z[9], Z_one[9];
+  whiten(u.inverse, y, Z);
+  whiten(u.inverse, one, Z_one);
+  for (int e = 0; e < 9; ++e) {
+    store(u.Z + at + e * kStride, Z[e]);
+    store(u.Z + at + (9 + e) * kStride, Z_one[e]);
+  }
+  double* marginal = u.marginals + 21 * block * kStride + lane;
+  int entry = 0;
+  for (int c = 0; c < 9; c += 3) {
+    for (int r = c; r < 9; r += 3, ++entry) {
+      double *posterior = marginal + entry * kStride, *T = marginal + (15 + entry) * kStride;
+      store(posterior, load(posterior) - Z[r] * Z[c] - Z[r + 1] * Z[c + 1] - Z[r + 2] * Z[c + 2]);
+      store(T, load(T) + Z_one[r] * Z_one[c] + Z_one[r + 1] * Z_one[c + 1] +
+                   Z_one[r + 2] * Z_one[c + 2]);
+    }
+    for (int r = 0; r < 9; r += 3) {
+      double* Q = marginal + (6 + c + r / 3) * kStride;
+      store(Q, load(Q) + Z_one[r] * Z[c] + Z_one[r + 1] * Z[c + 1] + Z_one[r + 2] * Z[c + 2]);
+    }
+  }
+}
+
 }  // namespace
 
 void update_marginals(const MarginalUpdate* updates, int count);
@@ -138,6 +196,23 @@ void update_marginals(const MarginalUpdate* updates, int count) {
 void update_partners(const PartnerUpdate& u);
 void update_partners(const PartnerUpdate& u) {
   for (long p = 0; p < u.count; p += kWidth) update_some_partners(u, p);
+}
+
+void update_stretches(const StretchUpdate& u);
+void update_stretches(const StretchUpdate& u) {
+  constexpr long kStretches = StretchUpdate::kStretches;
+  double behind[9] = {};
+  for (long block = 0; block * kStretches <= u.closures; ++block) {
+    for (long lane = 0; lane < kStretches; lane += kWidth)
+      update_some_stretches(u, block, lane, behind);
+    for (long b = block * kStretches; b < (block + 1) * kStretches && b < u.closures; ++b) {
+      const double *L = u.coupling + 9 * b, *end = u.ends + 9 * b;
+      for (int c = 0; c < 9; c += 3) {
+        for (int r = 0; r < 3; ++r)
+          behind[c + r] += L[r] * end[c] + L[3 + r] * end[c + 1] + L[6 + r] * end[c + 2];
+      }
+    }
+  }
 }
 
 }  // namespace cairn::CAIRN_KERNEL_SET

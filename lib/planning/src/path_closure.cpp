@@ -34,6 +34,74 @@ std::vector<const PathClosure*> in_order(const PathClosure* last) {
   return closures;
 }
 
+void update_stretches(std::span<const PathClosure* const> before, const Matrix3d& innovation,
+                      const Matrix3d& start, const Matrix3d& start_posterior,
+                      PathClosure& closure) {
+  constexpr std::size_t kStretches = StretchUpdate::kStretches;
+  static const UpdateStretches kernel = choose_stretch_kernel();
+  const std::size_t count = before.size() + 1, blocks = (count + kStretches - 1) / kStretches;
+  const auto at = [](std::size_t entries, std::size_t stretch, std::size_t entry) {
+    return (stretch / kStretches * entries + entry) * kStretches + stretch % kStretches;
+  };
+  std::vector<double> innovations(9 * kStretches * blocks, 0.0), ends;
+  std::vector<const double*> Z_before;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Matrix3d y = innovation + (i == 0 ? start : before[i - 1]->walk);
+    for (std::size_t e = 0; e < 9; ++e) innovations[at(9, i, e)] = y.data()[e];
+  }
+  for (const PathClosure* b : before) {
+    Z_before.push_back(b->stretch_Z.data());
+    ends.insert(ends.end(), b->end.data(), b->end.data() + 9);
+  }
+  closure.stretch_Z.resize(18 * kStretches * blocks);
+  if (!before.empty()) closure.stretch_marginals = before.back()->stretch_marginals;
+  closure.stretch_marginals.resize(21 * kStretches * blocks, 0.0);
+  const Matrix3d& newest = before.empty() ? start_posterior : before.back()->posterior;
+  std::size_t entry = 0;
+  for (int c = 0; c < 3; ++c) {
+    for (int r = c; r < 3; ++r)
+      closure.stretch_marginals[at(21, count - 1, entry++)] = newest(r, c);
+  }
+  kernel({.closures = static_cast<int>(before.size()),
+          .Z_before = Z_before.data(),
+          .ends = ends.data(),
+          .coupling = closure.coupling.empty() ? nullptr : closure.coupling.front().data(),
+          .inverse = closure.inverse.data(),
+          .innovation = innovations.data(),
+          .Z = closure.stretch_Z.data(),
+          .marginals = closure.stretch_marginals.data()});
+  // As they will be of the stretches that are still to come; their marginals are not begun.
+  for (std::size_t i = count; i < kStretches * blocks; ++i) {
+    for (std::size_t e = 0; e < 9; ++e) {
+      closure.stretch_Z[at(18, i, e)] = closure.end.data()[e];
+      closure.stretch_Z[at(18, i, 9 + e)] = 0.0;
+    }
+    for (std::size_t e = 0; e < 21; ++e) closure.stretch_marginals[at(21, i, e)] = 0.0;
+  }
+}
+
+StretchMarginals::StretchMarginals(const PathClosure& closure, int stretch) {
+  constexpr std::size_t kStretches = StretchUpdate::kStretches;
+  const auto i = static_cast<std::size_t>(stretch);
+  const double* entries =
+      closure.stretch_marginals.data() + i / kStretches * 21 * kStretches + i % kStretches;
+  const auto next = [&] { return *std::exchange(entries, entries + kStretches); };
+  for (int c = 0; c < 3; ++c) {
+    for (int r = c; r < 3; ++r) posterior(r, c) = posterior(c, r) = next();
+  }
+  for (double& entry : Q.reshaped()) entry = next();
+  for (int c = 0; c < 3; ++c) {
+    for (int r = c; r < 3; ++r) T(r, c) = T(c, r) = next();
+  }
+}
+
+Matrix3d StretchMarginals::after(const Matrix3d& D) const {
+  Matrix3d half = Q;
+  half.noalias() += 0.5 * T * D;
+  const Matrix3d less = D * half;
+  return posterior + D - less - less.transpose();
+}
+
 MarginalUpdates::MarginalUpdates(PoseCovariances& covariances, double memory, int most_poses,
                                  ClosureEffect PathClosure::*effect)
     : covariances_(covariances),
@@ -132,30 +200,6 @@ void MarginalUpdates::update(std::span<const PathClosure* const> closures) {
   const std::span<const double> ratios(ratios_);
   (closures.back()->*effect_).change = every_ * sum_of_logarithms(ratios.first(count_ - 1)) +
                                        last_weight_ * std::log(ratios[count_ - 1]);
-}
-
-void MarginalUpdates::whiten(std::span<const PathClosure* const> closures, int pose,
-                             std::vector<Matrix3d>& Z) {
-  Z.resize(closures.size());
-  const int newest = covariances_.size() - 1;
-  for (std::size_t c = 0; c < closures.size(); ++c) {
-    const PathClosure& closure = *closures[c];
-    if (const auto kept = (closure.*effect_).marginals.lock()) {
-      const double* entries = kept->Z.data() + pose;
-      for (std::ptrdiff_t entry = 0; entry < 9; ++entry)
-        Z[c].data()[entry] = entries[entry * covariances_.padded()];
-      continue;
-    }
-    if (const auto known = closure.pose_Z.find(pose); known != closure.pose_Z.end()) {
-      Z[c] = known->second;
-      continue;
-    }
-    Matrix3d y =
-        (covariances_.block(pose, newest) - covariances_.block(pose, closure.pose)).transpose();
-    for (std::size_t b = 0; b < c; ++b) y.noalias() -= closure.coupling[b] * Z[b];
-    Z[c].noalias() = closure.inverse * y;
-    closure.pose_Z.emplace(pose, Z[c]);
-  }
 }
 
 }  // namespace cairn

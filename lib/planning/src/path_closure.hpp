@@ -34,6 +34,13 @@ struct ClosureEffect {
   mutable std::optional<double> change;
 };
 
+/// What a path knows of how a pose l of the graph and its own end k are related, after its closures
+/// so far: with Σ_kk as it was before all of them, cov(ε_k − ε_l) = Σ_kk + apart and
+/// cov(ε_k, ε_k − ε_l) = Σ_kk − cross. Neither depends on k, since odometry's noise is independent.
+struct PoseTerms {
+  Eigen::Matrix3d apart, cross;
+};
+
 /// A loop closure on a path: the measurement y = ε_k − ε_l + ν of a pose k of the path and l of the
 /// graph. The closures of a path are a list from the last one back. Their innovations are whitened
 /// one after another: with S = L Lᵀ the joint covariance of all y, Z = L⁻¹ cov(y, ·) of any pose
@@ -49,17 +56,43 @@ struct PathClosure {
   Eigen::Matrix3d inverse;
   /// Z of all poses of the path from k on.
   Eigen::Matrix3d end;
-  /// Of the poses 1 … k − 1 of the path: Z, and Σ'_jj without the prior after all closures so far.
-  /// With these stored, a further closure takes time as there are closures, not as their square.
-  std::vector<Eigen::Matrix3d> path_Z, path_posterior;
-  /// Z of those poses of the graph for which it has been computed one by one.
-  mutable std::unordered_map<int, Eigen::Matrix3d> pose_Z;
+  /// Of ε_k, without the prior: what odometry has added since the graph, and after this closure.
+  Eigen::Matrix3d walk, posterior;
+  /// Of each stretch of the path before k, which begin at its start and where it closes loops: Z
+  /// of its first pose and Z₁ of noise on the stretch (see `StretchUpdate`), and after all closures
+  /// so far Σ' of its first pose, Q and T. A pose of the stretch to which odometry has come with
+  /// the noise D has Σ'_jj = Σ' + D − D Q − Qᵀ D − D T D. So a further closure takes time as there
+  /// are closures, and not as there are poses.
+  std::vector<double> stretch_Z, stretch_marginals;
+  /// Σ ln|Σ'_jj| of the poses 1 … k of the path, with the prior, once it has been asked for.
+  mutable std::optional<double> path_sum;
+  /// Z and terms of those poses of the graph for which they have been needed.
+  struct OfPose {
+    Eigen::Matrix3d Z;
+    PoseTerms terms;
+  };
+  mutable std::unordered_map<int, OfPose> of_poses;
   /// On all poses of the graph, and estimated by a few of them.
   ClosureEffect exact, estimate;
 };
 
 /// The closures of a path in their order.
 std::vector<const PathClosure*> in_order(const PathClosure* last);
+
+/// What a new closure, of which all but these is known, does to the stretches of the path.
+/// `innovation`: cov(y, ε_t) of the pose of the graph from which the path goes on, `start` the
+/// noise and `start_posterior` the covariance of ε at its start.
+void update_stretches(std::span<const PathClosure* const> before, const Eigen::Matrix3d& innovation,
+                      const Eigen::Matrix3d& start, const Eigen::Matrix3d& start_posterior,
+                      PathClosure& closure);
+
+/// Of a stretch of a path.
+struct StretchMarginals {
+  Eigen::Matrix3d posterior, Q, T;
+  StretchMarginals(const PathClosure& closure, int stretch);
+  /// Σ'_jj of the pose to which odometry has come with the noise D.
+  Eigen::Matrix3d after(const Eigen::Matrix3d& D) const;
+};
 
 /// The marginals of the graph's poses after the closures of a path, of all of them or of a few by
 /// which the others are estimated: marginals change smoothly along a trajectory.
@@ -80,10 +113,6 @@ class MarginalUpdates {
   /// `ClosureEffect::change`. The loops that a path has closed since it was asked for last are
   /// worked off together, in one pass over the poses.
   double change(const PathClosure& closure);
-  /// Z of the closures for one pose of the graph, with what they know of it already; only where it
-  /// is of all poses.
-  void whiten(std::span<const PathClosure* const> closures, int pose,
-              std::vector<Eigen::Matrix3d>& Z);
 
  private:
   MarginalUpdates(PoseCovariances& covariances, double memory, int most_poses,

@@ -26,9 +26,10 @@ struct PathInformation::Node {
   Pose2 pose;
   int steps = 0;
   double length = 0.0;
-  Matrix3d walk = Matrix3d::Zero();            ///< of ε_k − ε_t, without loop closures
-  Matrix3d posterior = Matrix3d::Zero();       ///< of ε_k, without the prior
-  double path_sum = 0.0;                       ///< Σ ln|Σ_jj| of those of the path
+  Matrix3d walk = Matrix3d::Zero();       ///< of ε_k − ε_t, without loop closures
+  Matrix3d posterior = Matrix3d::Zero();  ///< of ε_k, without the prior
+  /// Σ ln|Σ_jj| of those of the path; with `loops=exact` of those since the last closure.
+  double path_sum = 0.0;
   double odometry = 0.0, loop = 0.0;           ///< changes of ln|Λ|
   std::shared_ptr<const PathClosure> closure;  ///< the last one
 };
@@ -55,7 +56,11 @@ class PathInformation::Model {
         newest_(covariances_.size() - 1),
         loop_gain_(match_.loop_gain_unless(options.loop_gain)),
         factor_(options.entropy == EntropyForm::standard ? 0.5 : 1.0),
-        log_match_(std::log(match_.covariance().determinant())) {
+        match_determinant_(match_.covariance().determinant()) {
+    for (int l = 0; options.loops == LoopForm::exact && l < covariances_.size(); ++l) {
+      const Matrix3d cross = covariances_.block(l, newest_).transpose();  // of ε_k and ε_l
+      terms_.push_back({covariances_.diagonal(l) - cross - cross.transpose(), cross});
+    }
     start_ = std::make_shared<Node>();
     start_->model = this;
     start_->pose = situation.pose;
@@ -93,6 +98,7 @@ class PathInformation::Model {
   double change(const Node& node, bool is_exact) {
     double sum = updates_.sum() + node.path_sum;
     if (node.closure && options_.loops == LoopForm::exact) {
+      sum += path_sum(node);
       MarginalUpdates& updates = is_exact || estimates_.is_of_all() ? updates_ : estimates_;
       sum += updates.change(*node.closure);
     }
@@ -105,12 +111,8 @@ class PathInformation::Model {
   int poses() const { return covariances_.size(); }
 
  private:
-  /// Calls for each pose of the graph that one of a path may close a loop with, in their order.
-  template <class Each>
-  void for_matches(const Pose2& newer, Each each) {
-    index_.for_each(newer, [&](int number) {
-      if (!can_match_ || can_match_(covariances_.pose(number), newer)) each(number);
-    });
+  bool can_match(int older, const Pose2& newer) const {
+    return !can_match_ || can_match_(covariances_.pose(older), newer);
   }
 
   double log_determinant(const Matrix3d& without_prior) const {
@@ -125,79 +127,93 @@ class PathInformation::Model {
     double determinant = std::numeric_limits<double>::infinity();  ///< |Σ'_kk|
     double gain = 0.0;                                             ///< ln(|S| / |R|)
     Matrix3d S, K;                                                 ///< cov(y, y), cov(ε_k, y)
-    std::vector<Matrix3d> difference;  ///< Z_k − Z_l of each closure before
   };
 
-  Choice best_choice(const Node& node, std::span<const PathClosure* const> closures) {
+  /// After the closures of a path, of which `last` is the newest; null: there is none.
+  const PoseTerms& terms(const PathClosure* last, int l) {
+    if (!last) return terms_[static_cast<std::size_t>(l)];
+    if (const auto known = last->of_poses.find(l); known != last->of_poses.end())
+      return known->second.terms;
+    PoseTerms terms = this->terms(last->before.get(), l);
+    Matrix3d y = (covariances_.block(l, newest_) - covariances_.block(l, last->pose)).transpose();
+    auto coupling = last->coupling.rbegin();
+    for (const PathClosure* b = last->before.get(); b; b = b->before.get())
+      y.noalias() -= *coupling++ * b->of_poses.find(l)->second.Z;
+    const Matrix3d Z = last->inverse * y, difference = last->end - Z;
+    terms.apart.noalias() -= difference.transpose() * difference;
+    terms.cross.noalias() += last->end.transpose() * difference;
+    return last->of_poses.emplace(l, PathClosure::OfPose{Z, terms}).first->second.terms;
+  }
+
+  Choice best_choice(const Node& node) {
     Choice best;
     const Matrix3d R = covariances_.moved(node.pose, match_.covariance());
     const Matrix3d end = covariances_.diagonal(newest_) + node.walk;
-    std::vector<Matrix3d> difference;
-    for_matches(node.pose, [&](int l) {
-      updates_.whiten(closures, l, difference);
-      const Matrix3d cross = covariances_.block(l, newest_).transpose();  // of ε_k and ε_l
-      Matrix3d S = end + covariances_.diagonal(l) - cross - cross.transpose() + R;
-      Matrix3d K = end - cross;
-      for (std::size_t c = 0; c < closures.size(); ++c) {
-        difference[c] = closures[c]->end - difference[c];
-        S.noalias() -= difference[c].transpose() * difference[c];
-        K.noalias() -= closures[c]->end.transpose() * difference[c];
-      }
-      S = symmetric(S);
-      const double gain = std::log(S.determinant()) - log_match_;
-      if (!(gain > 2.0 * loop_gain_)) return;
-      const Matrix3d after =
-          node.posterior + covariances_.prior() - K * S.inverse() * K.transpose();
-      const double determinant = after.determinant();
-      if (!(determinant < best.determinant)) return;
-      best = {l, determinant, gain, S, K, difference};
+    const Matrix3d before = node.posterior + covariances_.prior();
+    const double least = match_determinant_ * std::exp(2.0 * loop_gain_);
+    index_.for_each(node.pose, [&](int l) {
+      const PoseTerms& known = terms(node.closure.get(), l);
+      const Matrix3d S = symmetric(end + R + known.apart);
+      if (!(S.determinant() > least)) return;
+      const Matrix3d K = end - known.cross;
+      const double determinant = (before - K * S.inverse() * K.transpose()).determinant();
+      // Last whether it can be matched, which takes longest.
+      if (!(determinant < best.determinant) || !can_match(l, node.pose)) return;
+      best = {l, determinant, 0.0, S, K};
     });
+    if (best.pose >= 0) best.gain = std::log(best.S.determinant() / match_determinant_);
     return best;
   }
 
   void close_exactly(Node& node) {
-    const std::vector<const PathClosure*> closures = in_order(node.closure.get());
-    const Choice choice = best_choice(node, closures);
+    const Choice choice = best_choice(node);
     if (choice.pose < 0) return;
+    const std::vector<const PathClosure*> closures = in_order(node.closure.get());
     auto closure = std::make_shared<PathClosure>();
     closure->before = node.closure;
     closure->count = static_cast<int>(closures.size()) + 1;
     closure->pose = choice.pose;
     closure->step = node.steps;
     closure->ratio = choice.determinant / (node.posterior + covariances_.prior()).determinant();
-    for (const Matrix3d& difference : choice.difference)
-      closure->coupling.emplace_back(difference.transpose());
+    for (const PathClosure* c : closures)
+      closure->coupling.emplace_back(
+          (c->end - c->of_poses.find(choice.pose)->second.Z).transpose());
     const Matrix3d L = Eigen::LLT<Matrix3d>(choice.S).matrixL();
     closure->inverse = L.triangularView<Eigen::Lower>().solve(Matrix3d::Identity());
     closure->end = closure->inverse * choice.K.transpose();
     node.posterior = symmetric(node.posterior - closure->end.transpose() * closure->end);
     node.loop += choice.gain;
     node.closure = closure;
-    node.path_sum = path_sum(node, closures, *closure);
+    node.path_sum = 0.0;
+    closure->walk = node.walk;
+    closure->posterior = node.posterior;
+    const Matrix3d innovation =
+        covariances_.diagonal(newest_) - covariances_.block(choice.pose, newest_);
+    update_stretches(closures, innovation, start_->walk, start_->posterior, *closure);
   }
 
-  /// Σ ln|Σ_jj| of the poses of a path after its newest closure, which is made to know them.
-  double path_sum(const Node& last, std::span<const PathClosure* const> before,
-                  PathClosure& newest) {
-    const auto count = static_cast<std::size_t>(last.steps - 1);
-    newest.path_Z.resize(count);
-    newest.path_posterior.resize(count);
-    const Matrix3d from_pose = covariances_.block(newest.pose, newest_);  // Σ_lt
-    double sum = log_determinant(last.posterior);
-    for (const Node* node = last.before.get(); node->steps > 0; node = node->before.get()) {
-      const auto j = static_cast<std::size_t>(node->steps - 1);
-      const auto first = static_cast<std::size_t>(node->closure ? node->closure->count : 0);
-      Matrix3d y = covariances_.diagonal(newest_) + node->walk - from_pose;
-      for (std::size_t b = 0; b < before.size(); ++b)
-        y.noalias() -= newest.coupling[b] * (b < first ? before[b]->end : before[b]->path_Z[j]);
-      newest.path_Z[j].noalias() = newest.inverse * y;
-      const Matrix3d& posterior =
-          first == before.size() ? node->posterior : before.back()->path_posterior[j];
-      newest.path_posterior[j] = posterior;
-      newest.path_posterior[j].noalias() -= newest.path_Z[j].transpose() * newest.path_Z[j];
-      sum += log_determinant(newest.path_posterior[j]);
+  /// Σ ln|Σ_jj| of the poses of a path up to its newest closure, after it.
+  double path_sum(const Node& last) const {
+    const PathClosure& newest = *last.closure;
+    if (newest.path_sum) return *newest.path_sum;
+    constexpr int kDeterminantsPerLogarithm = 8;  // even 10⁻³⁰ each does not underflow
+    double sum = 0.0, product = (newest.posterior + covariances_.prior()).determinant();
+    int factors = 1;
+    const Node* node = &last;
+    while (node->steps >= newest.step) node = node->before.get();
+    while (node->steps > 0) {
+      const PathClosure* begin = node->closure.get();
+      const StretchMarginals stretch(newest, begin ? begin->count : 0);
+      const Matrix3d& walk = begin ? begin->walk : start_->walk;
+      for (; node->steps > 0 && node->closure.get() == begin; node = node->before.get()) {
+        product *= (stretch.after(node->walk - walk) + covariances_.prior()).determinant();
+        if (++factors % kDeterminantsPerLogarithm > 0) continue;
+        sum += std::log(product);
+        product = 1.0;
+      }
     }
-    return sum;
+    newest.path_sum = sum + std::log(product);
+    return *newest.path_sum;
   }
 
   // As in the thesis ------------------------------------------------------------------------------
@@ -220,11 +236,11 @@ class PathInformation::Model {
     Matrix3d after;
     int best = -1;
     double least = now.determinant() * std::exp(-2.0 * loop_gain_);
-    for_matches(node.pose, [&](int l) {
+    index_.for_each(node.pose, [&](int l) {
       const Matrix3d older = std::cbrt(ratio(node.closure.get(), l)) *
                              (covariances_.diagonal(l) + covariances_.prior());
       const double determinant = (older + R).determinant();
-      if (!(determinant < least)) return;
+      if (!(determinant < least) || !can_match(l, node.pose)) return;
       least = determinant;
       best = l;
       after = older + R;
@@ -252,7 +268,8 @@ class PathInformation::Model {
   OdometryModel odometry_;
   MatchIndex index_;
   int newest_;
-  double loop_gain_, factor_, log_match_;
+  double loop_gain_, factor_, match_determinant_;
+  std::vector<PoseTerms> terms_;  ///< of each pose, before any closure
   std::shared_ptr<Node> start_;
 };
 

@@ -76,6 +76,27 @@ TEST(PathInformation, ExactLoopsAreThoseOfFullInference) {
   EXPECT_GE(most, 4);
 }
 
+/// So many that the stretches between them fill several registers.
+TEST(PathInformation, ManyLoopsAreThoseOfFullInference) {
+  int most = 0;
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const PathGraph graph = test::wandering(60, 5.0, seed);
+    PathInformation information(graph.situation(),
+                                {.entropy = EntropyForm::thesis, .loop_gain = 0.02});
+    RandomNumbers random(seed + 100);
+    State end = information.start();
+    for (const Pose2& motion : test::random_motions(graph.pose, 150, 5.0, random)) {
+      end = information.extended(end, motion);
+      if (end.steps() % 10 > 0) continue;
+      const test::FullInference full = test::infer(graph, end);
+      EXPECT_NEAR(end.trajectory_change(), full.trajectory_entropy, 1e-8);
+      EXPECT_LT((end.covariance() - full.end).norm(), 1e-8 * full.end.norm());
+    }
+    most = std::max(most, end.loops());
+  }
+  EXPECT_GT(most, 20);
+}
+
 TEST(PathInformation, LogDeterminantsAreTheDenseOnes) {
   int loops = 0;
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {

@@ -94,6 +94,33 @@ TYPED_TEST(RrtStarTree, StoresTheCostsOfItsPathsThroughAllRewirings) {
   EXPECT_GT(rewired, 300);
 }
 
+/// Paths are evaluated when they are asked for: whether some are on the way changes nothing.
+TYPED_TEST(RrtStarTree, DoesNotDependOnWhenItsPathsAreAskedFor) {
+  const FloorMap map = two_rooms();
+  const FreeSpace space(map, {1.0, 1.0}, 0.2);
+  TypeParam cost;
+  RrtStar<TypeParam> late(space, cost, {.step = 0.5, .reach = 1.5}),
+      always(space, cost, {.step = 0.5, .reach = 1.5}),
+      one(space, cost, {.step = 0.5, .reach = 1.5});
+  RandomNumbers random(4);
+  for (int n = 0; n < 1500; ++n) {
+    const Vector2d sample = space.sample(random);
+    late.extend(sample);
+    always.extend(sample);
+    one.extend(sample);
+    static_cast<void>(always.nodes());
+    static_cast<void>(one.value(n * 7 % one.size()));
+  }
+  ASSERT_EQ(late.size(), always.size());
+  ASSERT_EQ(late.size(), one.size());
+  expect_sound(one, space, cost);
+  for (int k = late.size(); k-- > 0;) {
+    EXPECT_EQ(late.value(k), always.value(k));
+    EXPECT_EQ(late.nodes()[std::size_t(k)].parent, always.nodes()[std::size_t(k)].parent);
+    EXPECT_EQ(one.nodes()[std::size_t(k)].parent, always.nodes()[std::size_t(k)].parent);
+  }
+}
+
 TYPED_TEST(RrtStarTree, TheSameSamplesGrowTheSameTree) {
   const FloorMap map = two_rooms();
   const FreeSpace space(map, {1.0, 1.0}, 0.2);

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <concepts>
+#include <cstddef>
 #include <limits>
 #include <numbers>
 #include <utility>
@@ -64,9 +65,10 @@ struct RrtStarOptions {
 /// that the tree comes through doors as well. The new node's parent
 /// is the one, of the nodes within r_n, by which its path costs least; then those nodes get the new
 /// one as their parent whose paths then cost less, and the costs of all their descendants are
-/// computed anew. r_n = min(γ (ln n / n)^{1/2}, r_max) with n nodes, and γ from the free area as
-/// asymptotic optimality asks, for the two dimensions of a position (thesis: exponent 1/3, for
-/// three). For costs that do not add up along a path no optimality holds.
+/// computed anew: each when it is asked for, since most change several times before. r_n = min(γ
+/// (ln n / n)^{1/2}, r_max) with n nodes, and γ from the free area as asymptotic optimality asks,
+/// for the two dimensions of a position (thesis: exponent 1/3, for three). For costs that do not
+/// add up along a path no optimality holds.
 template <PathCost Cost>
 class RrtStar {
  public:
@@ -75,6 +77,7 @@ class RrtStar {
     int parent = -1;
     std::vector<int> children = {};
     typename Cost::State state;
+    bool outdated = false;  ///< the state is that of a former path to it; never where others see it
   };
 
   /// `space` and `cost` must outlive it. The tree begins with `space.entry()`, which must not be
@@ -91,7 +94,7 @@ class RrtStar {
     nodes_.push_back({.point = entry.front(), .state = cost_.root(entry.front())});
     for (std::size_t k = 1; k < entry.size(); ++k) {
       const int last = size() - 1;
-      add(entry[k], last, cost_.extended(at(last).state, at(last).point, entry[k], nullptr));
+      add(entry[k], last, extended(last, entry[k], nullptr));
     }
   }
 
@@ -119,7 +122,7 @@ class RrtStar {
     typename Cost::State best = at(nearest).state;  // replaced below
     double least = std::numeric_limits<double>::infinity();
     for (const int near : near_) {
-      auto state = cost_.extended(at(near).state, at(near).point, point, nullptr);
+      auto state = extended(near, point, nullptr);
       const double value = cost_.value(state);
       if (parent >= 0 && !(value < least)) continue;
       parent = near;
@@ -135,7 +138,7 @@ class RrtStar {
 
   /// Adds nodes at random until there are `density` of them per m² of free space, or `seconds` are
   /// over, or `interrupt`, if not null, is true. False: it was one of the latter two, so that the
-  /// tree depends on the clock.
+  /// tree depends on the clock. The time is for the states of all nodes as well.
   bool grow(RandomNumbers& random, double density,
             double seconds = std::numeric_limits<double>::infinity(),
             const std::atomic<bool>* interrupt = nullptr) {
@@ -145,9 +148,10 @@ class RrtStar {
     constexpr double kMostTries = 20.0;  // per node: space whose parts no segment joins stays empty
     for (double tries = kMostTries * wanted; size() < wanted && tries > 0.0; --tries) {
       if (interrupt && interrupt->load(std::memory_order_relaxed)) return false;
-      if (std::isfinite(seconds) &&
-          std::chrono::duration<double>(Clock::now() - start).count() > seconds) {
-        return false;
+      if (std::isfinite(seconds)) {
+        const double passed = std::chrono::duration<double>(Clock::now() - start).count();
+        // And what the paths will take that are not up to date.
+        if (passed * (evaluated_ + outdated_) > seconds * std::max(evaluated_, 1)) return false;
       }
       extend(space_.sample(random));
     }
@@ -155,8 +159,14 @@ class RrtStar {
   }
 
   int size() const { return static_cast<int>(nodes_.size()); }
-  const std::vector<Node>& nodes() const { return nodes_; }
-  double value(int node) const { return cost_.value(at(node).state); }
+  const std::vector<Node>& nodes() const {
+    for (int node = 0; outdated_ > 0 && node < size(); ++node) update(node);
+    return nodes_;
+  }
+  double value(int node) const {
+    update(node);
+    return cost_.value(at(node).state);
+  }
   /// From the root to a node, both included.
   std::vector<int> path(int node) const {
     std::vector<int> path;
@@ -172,8 +182,7 @@ class RrtStar {
     double least = std::numeric_limits<double>::infinity();
     for (const int near : near_) {
       if (!space_.is_clear(at(near).point, point)) continue;
-      const double value =
-          cost_.value(cost_.extended(at(near).state, at(near).point, point, nullptr));
+      const double value = cost_.value(extended(near, point, nullptr));
       if (best >= 0 && !(value < least)) continue;
       best = near;
       least = value;
@@ -194,8 +203,7 @@ class RrtStar {
     return part == 0.0 ? low : high;
   }
 
-  Node& at(int node) { return nodes_[static_cast<std::size_t>(node)]; }
-  const Node& at(int node) const { return nodes_[static_cast<std::size_t>(node)]; }
+  Node& at(int node) const { return nodes_[static_cast<std::size_t>(node)]; }
 
   /// Nodes that a segment joins with a point, the nearest one among them.
   void find_near(const Eigen::Vector2d& point, int nearest) {
@@ -224,27 +232,49 @@ class RrtStar {
   }
 
   void rewire(int node, int parent) {
-    auto state = cost_.extended(at(parent).state, at(parent).point, at(node).point, nullptr);
     // A cost that is no metric may be less by way of a descendant.
-    if (!(cost_.value(state) < value(node)) || is_ancestor(node, parent)) return;
+    if (is_ancestor(node, parent)) return;
+    auto state = extended(parent, at(node).point, nullptr);
+    if (!(cost_.value(state) < value(node))) return;
     std::erase(at(at(node).parent).children, node);
     at(node).parent = parent;
     at(node).state = cost_.adopted(std::move(state), at(parent).state);
     at(parent).children.push_back(node);
-    update_descendants(node);
+    outdate_descendants(node);
   }
 
-  void update_descendants(int node) {
-    std::vector<int> open{node};
-    while (!open.empty()) {
-      const Node& above = at(open.back());
-      open.pop_back();
+  /// The state of the path by way of a node.
+  typename Cost::State extended(int node, const Eigen::Vector2d& to,
+                                const typename Cost::State* before) const {
+    update(node);
+    ++evaluated_;
+    return cost_.extended(at(node).state, at(node).point, to, before);
+  }
+
+  /// Where a node is outdated all behind it are.
+  void outdate_descendants(int node) {
+    open_.assign(1, node);
+    while (!open_.empty()) {
+      const Node& above = at(open_.back());
+      open_.pop_back();
       for (const int child : above.children) {
-        Node& below = at(child);
-        below.state = cost_.adopted(
-            cost_.extended(above.state, above.point, below.point, &below.state), above.state);
-        open.push_back(child);
+        if (std::exchange(at(child).outdated, true)) continue;
+        ++outdated_;
+        open_.push_back(child);
       }
+    }
+  }
+
+  void update(int node) const {
+    if (!at(node).outdated) return;
+    std::vector<int> outdated;
+    for (; at(node).outdated; node = at(node).parent) outdated.push_back(node);
+    for (; !outdated.empty(); outdated.pop_back()) {
+      Node& below = at(outdated.back());
+      below.outdated = false;
+      --outdated_;
+      auto state = extended(below.parent, below.point, &below.state);
+      below.state = cost_.adopted(std::move(state), at(below.parent).state);
     }
   }
 
@@ -252,8 +282,9 @@ class RrtStar {
   Cost& cost_;
   double step_, reach_, gamma_;
   PointBuckets points_;
-  std::vector<Node> nodes_;
-  std::vector<int> near_;  ///< of the newest point
+  mutable std::vector<Node> nodes_;
+  std::vector<int> near_, open_;              ///< of the newest point
+  mutable int outdated_ = 0, evaluated_ = 0;  ///< nodes; paths, so far
 };
 
 }  // namespace cairn
