@@ -275,6 +275,8 @@ Job prepare(const CompactOptions& options, const std::string& strategy,
       !job.policy.values.emplace("keep", fmt::format("{}", options.keep)).second)
     throw Error(ErrorCode::usage, "--keep, and keep among the policy's options: give one");
   if (!result.strategy.empty()) emplace({{"strategy", strategy_of_policy(result.strategy)}});
+  // The policy's own map is not kept, so that relocation costs nothing.
+  if (result.is_whole() && table.find("reuse")) emplace({{"reuse", "true"}});
   return result;
 }
 

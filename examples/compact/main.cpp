@@ -29,7 +29,7 @@ Factor measure(Id from, Id to) {
 }
 
 int main() {
-  const auto policy = make<PosePolicy>("compact_pose:range=1,angle=0.5");
+  const auto policy = make<PosePolicy>("compact_pose:range=1,angle=0.5,reuse=true");
   for (Id id = 0; id < kLaps * kPosesPerLap; ++id) {
     std::vector<Factor> odometry;
     if (id > 0) odometry.push_back(measure(id - 1, id));

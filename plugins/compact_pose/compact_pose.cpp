@@ -499,7 +499,9 @@ bool CompactPose::agrees_with_waiting(const Link& link) {
 /// closures are not better than odometry, the loss would add up. The more poses are kept nearby,
 /// the less each way matters, and the more is gained by not keeping another.
 std::optional<double> CompactPose::relocation(const Link& link) const {
-  if (!options_.reuse || !(pose_gain_ > 0.0)) return std::nullopt;  // or every pose is to be kept
+  // Where another pose would have to leave, information is lost in any case.
+  if (!options_.reuse && !graph_.full()) return std::nullopt;
+  if (!(pose_gain_ > 0.0)) return std::nullopt;  // every pose is to be kept
   const double n = graph_.group().tangent_size();
   const double of_way = part_of_way(graph_.newest_odometry(), link.covariance);
   const Matrix rest = link.covariance / (1.0 - of_way);
@@ -507,8 +509,7 @@ std::optional<double> CompactPose::relocation(const Link& link) const {
   // ever.
   const double enough = std::max(pose_gain_, 0.5 * n * std::log(4.0));
   if (!(mutual_information(typical_.covariance(), rest) < enough)) return std::nullopt;
-  // Where another pose would have to leave, information is lost in any case; and where the bridge
-  // is not informative, nothing is divided.
+  // Where the bridge is not informative, nothing is divided.
   if (graph_.full()) return of_way;
   const Matrix end = graph_.newest_odometry() + link.covariance;
   const double lost = mutual_information(end, link.covariance);

@@ -42,7 +42,8 @@ namespace cairn::compact {
 /// is the same as if all were recomputed, as long as the linearisation is unchanged.
 ///
 /// With `reuse`, which the paper does not have, a pose that is linked to a kept one is not kept
-/// itself (`CompactGraph::relocate`): so the map of a place does not grow without end.
+/// itself (`CompactGraph::relocate`): so the map of a place does not grow without end. Its error is
+/// larger then.
 ///
 /// With `keep`, which the paper does not have either, poses leave where there are more
 /// (`CompactGraph::make_room`): so no map grows without end, however large the place is.
@@ -81,7 +82,6 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   OptionValues found() const override;
   /// `loop_gain` and `pose_gain` times the factors.
   OptionValues scaled(const OptionValues& found, double links, double poses) const override;
-  OptionValues careful() const override { return {{"reuse", "false"}}; }
   double accuracy() const override;
 
  private:

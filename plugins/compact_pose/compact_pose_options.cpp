@@ -97,7 +97,8 @@ OptionFields<CompactPoseOptions> CompactPoseOptions::fields() {
             "higher probability than this")
       .boolean("reuse", &O::reuse,
                "continue from the kept pose that a link leads to, instead of keeping the pose that "
-               "was linked: the map stops growing")
+               "was linked: the map stops growing, and is less accurate; with keep, always once "
+               "poses have to leave")
       .real("reuse_loss", &O::reuse_loss, 0.0, 10.0,
             "with reuse: largest loss of information about the link, times the poses that are kept "
             "nearby [nats per DoF]")

@@ -70,7 +70,9 @@ struct CompactPoseOptions {
   Search search = Search::index;
   double gate = 0.0;    ///< part of the right links that pass the consistency check; 0: off
   double trust = 0.01;  ///< see `ConsistencyCheck`
-  bool reuse = true;    ///< a pose that is found to be at a kept one is not kept itself
+  /// Whether a pose that is found to be at a kept one is not kept itself; where poses have to leave
+  /// (`keep`) it never is.
+  bool reuse = false;
   /// … where the link loses at most this information [nats per DoF and kept pose nearby].
   double reuse_loss = 0.06;
   int matches = 0;  ///< most requests for a match per pose; 0: any number

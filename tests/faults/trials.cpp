@@ -92,7 +92,7 @@ Trial online_trial(const std::string& name, std::vector<std::string> arguments,
 }
 
 const std::vector<std::string> kOnline{"--output", "last", "--marginals", "last"};
-const std::vector<std::string> kPolicy{"--policy", "compact_pose:range=3,angle=1"};
+const std::vector<std::string> kPolicy{"--policy", "compact_pose:range=3,angle=1,reuse=true"};
 
 std::vector<Trial> online_trials() {
   Trial fresh = online_trial("online", kOnline, "stream.txt");

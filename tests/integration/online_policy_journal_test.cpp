@@ -101,7 +101,7 @@ TEST_F(OnlinePolicy, AMapOfAFixedNumberOfPosesIsRestored) {
   const Arguments keep{"--keep", "30", "--output", "changed"};
   const auto with = [&](Arguments more) {
     more.insert(more.end(), keep.begin(), keep.end());
-    return online("compact_pose:range=3,angle=0.8,gate=0.9", more);
+    return online("compact_pose:range=3,angle=0.8,reuse=true,gate=0.9", more);
   };
   const Dialogue whole = drive(graph, with({"-o", folder_.file("whole.g2o")}), questions);
   ASSERT_GT(whole.count("REMOVED"), 5);
@@ -129,7 +129,7 @@ TEST_F(OnlinePolicy, AMapOfAFixedNumberOfPosesIsRestored) {
   }
   EXPECT_EQ(read_text(folder_.file("parts.g2o")), read_text(folder_.file("whole.g2o")));
   // Another number of poses would give another map.
-  EXPECT_EQ(cairn(online("compact_pose:range=3,angle=0.8,gate=0.9",
+  EXPECT_EQ(cairn(online("compact_pose:range=3,angle=0.8,reuse=true,gate=0.9",
                          {"--keep", "31", "--output", "changed", "--journal", folder_.file("log")}),
                   {}, "")
                 .exit_code,
@@ -191,7 +191,7 @@ TEST_F(OnlinePolicy, WhatAQuestionSettledOrAskedIsInTheJournal) {
 
 TEST_F(OnlinePolicy, LinksThatWereRevokedStaySo) {
   const std::string graph = generate("manhattan:poses=150");
-  const Dialogue driven = drive(graph, online("compact_pose:range=3,angle=0.8"));
+  const Dialogue driven = drive(graph, online("compact_pose:range=3,angle=0.8,reuse=true"));
   ASSERT_GT(driven.count("LINKED"), 5);
   // The same again, in which every third link is revoked twenty lines later.
   std::multimap<std::size_t, std::string> revoked;
@@ -207,7 +207,9 @@ TEST_F(OnlinePolicy, LinksThatWereRevokedStaySo) {
     told.push_back(driven.told[k]);
     for (auto [at, end] = revoked.equal_range(k); at != end; ++at) told.push_back(at->second);
   }
-  const auto with = [&](Arguments more) { return online("compact_pose:range=3,angle=0.8", more); };
+  const auto with = [&](Arguments more) {
+    return online("compact_pose:range=3,angle=0.8,reuse=true", more);
+  };
   const Outcome whole = cairn(with({"-o", folder_.file("whole.g2o")}), {}, joined(told));
   ASSERT_EQ(whole.exit_code, 0) << whole.err;
   const Lines answers = lines(whole.out);
@@ -286,7 +288,7 @@ TEST_F(OnlinePolicy, LandmarksAreRestoredAndTheSameAsRecorded) {
   const std::string graph = folder_.file("landmarks.g2o");
   ASSERT_EQ(cairn({"generate", "landmarks2d:poses=150", "-o", graph}).exit_code, 0);
   compare_live_with_recorded(folder_, told_of(lines(read_text(graph)), "EDGE_SE2_XY"),
-                             "compact_pose:range=3,angle=0.8,landmark_gain=0.8", graph,
+                             "compact_pose:range=3,angle=0.8,reuse=true,landmark_gain=0.8", graph,
                              {" ADDED ", " TAKEN ", " UNINFORMATIVE "});
 }
 
@@ -308,7 +310,7 @@ TEST_F(OnlinePolicy, BearingsAreRestoredAndTheSameAsRecorded) {
   recorded.push_back("VERTEX_XY 9000 1 1");
   recorded.push_back(tag + " 20 9000 0.5 1 400 0 0");
   write_text(graph, joined(recorded));
-  const std::string policy = "compact_pose:range=3,angle=0.8,several_views=true";
+  const std::string policy = "compact_pose:range=3,angle=0.8,reuse=true,several_views=true";
   const Lines told = told_of(recorded, tag);
   compare_live_with_recorded(folder_, told, policy, graph,
                              {" ADDED ", " TAKEN ", " UNINFORMATIVE ", "LANDMARK 20 9000 WAITING"});
@@ -330,7 +332,7 @@ TEST_F(OnlinePolicy, AbsoluteMeasurementsAreRestoredAndTheSameAsRecorded) {
     }
     told.push_back("DONE");
   }
-  const std::string policy = "compact_pose:range=3,angle=0.8";
+  const std::string policy = "compact_pose:range=3,angle=0.8,reuse=true";
   const Outcome whole = cairn(online(policy, {"-o", folder_.file("whole.g2o")}), {}, joined(told));
   ASSERT_EQ(whole.exit_code, 0) << whole.err;
   EXPECT_THAT(whole.out, HasSubstr(" WAITING "));

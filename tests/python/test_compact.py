@@ -346,7 +346,7 @@ def circle(poor=0, poses=400, seed=2, bias=0.0, **options):
         motion = Pose2((1 + bias) * motion.x, motion.y, motion.theta + bias / 5)
         return Factor(Between(i, k, motion.retract(delta)), sigmas=scale * sigmas)
 
-    policy = cairn.PosePolicy("compact_pose", range=5, angle=0.5, **options)
+    policy = cairn.PosePolicy("compact_pose", range=5, angle=0.5, reuse=True, **options)
     matches, requests, errors = 0, [], []
     for k in range(poses):
         policy.add_pose(k, measured(k - 1, k, 1, bias) if k else None, value=None if k else truth(0))

@@ -115,6 +115,9 @@ bool complete(const Plan& plan, const PolicySetting& setting, PolicyJob& job, Bo
     throw Error(ErrorCode::usage, "keep= is given, and among the policy's options: give one");
   if (!out.strategy.empty())
     options.emplace("strategy", out.strategy == kWhole ? "fpfl" : out.strategy);
+  // The policy's own map is not kept, so that relocation costs nothing.
+  if (out.strategy == kWhole && registry.options(PosePolicy::kKind, job.policy.name).find("reuse"))
+    options.emplace("reuse", "true");
   return true;
 }
 

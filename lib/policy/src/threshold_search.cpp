@@ -24,8 +24,6 @@ constexpr int kSpread = 40;
 /// Trials in one direction.
 constexpr int kMostTrials = 10;
 const double kStep = std::sqrt(2.0);
-/// The careful options are chosen where the error is below this part of that without them.
-constexpr double kClearlyBetter = 0.8;
 /// Measurements that agree with one another better than that were computed from a result.
 constexpr double kLeastNoiseScale = 1e-3;
 
@@ -137,15 +135,14 @@ ThresholdSample threshold_sample(const PolicyData& data, double part) {
 
 void refine_thresholds(const OptionFinder& finder, const ThresholdTest& test,
                        FoundThresholds& found, const std::function<bool()>& interrupted) {
-  OptionValues first = found.options;
+  const OptionValues first = found.options;
   double least = std::numeric_limits<double>::infinity();
-  bool good = false;
   const auto attempt = [&](double links, double poses) {
     const OptionValues options = finder.scaled(first, links, poses);
     found.trials.push_back(test(options, links, poses));
     ThresholdTrial& trial = found.trials.back();
     trial.options = options;
-    good = trial.error() <= found.tolerance;
+    const bool good = trial.error() <= found.tolerance;
     if (good || trial.error() < least) {  // if none is good, the one with the least error
       found.options = options;
       found.chosen = found.trials.size() - 1;
@@ -153,35 +150,16 @@ void refine_thresholds(const OptionFinder& finder, const ThresholdTest& test,
     }
     return !good && !(interrupted && interrupted());
   };
-  const auto lower_links = [&] {
-    if (!attempt(1.0, 1.0)) return false;
-    double factor = 1.0;
-    const std::size_t before = found.trials.size();
-    for (int k = 0; k < kMostTrials; ++k) {
-      // Where lower gains let no more links through, it is poses that are missing.
-      const std::size_t n = found.trials.size();
-      const std::int64_t loops = found.trials.back().loops_kept;
-      if (n > before + 1 && loops > 0 && loops == found.trials[n - 3].loops_kept) break;
-      if (!attempt(factor /= kStep, 1.0)) return false;
-    }
-    return true;
-  };
-  const bool found_some = !lower_links();
-  const OptionValues careful = finder.careful();
-  for (const auto& [name, value] : careful) first.insert_or_assign(name, value);
-  if (found_some) {
-    if (!good || careful.empty()) return;
-    const OptionValues options = found.options;
-    const std::size_t chosen = found.chosen;
-    const double error = found.trials[chosen].error();
-    attempt(found.trials[chosen].links, 1.0);
-    if (found.trials.back().error() < kClearlyBetter * error) return;
-    found.options = options;
-    found.chosen = chosen;
-    return;
-  }
-  if (!careful.empty() && !lower_links()) return;
+  if (!attempt(1.0, 1.0)) return;
   double factor = 1.0;
+  for (int k = 0; k < kMostTrials; ++k) {
+    // Where lower gains let no more links through, it is poses that are missing.
+    const std::size_t n = found.trials.size();
+    const std::int64_t loops = found.trials.back().loops_kept;
+    if (n > 2 && loops > 0 && loops == found.trials[n - 3].loops_kept) break;
+    if (!attempt(factor /= kStep, 1.0)) return;
+  }
+  factor = 1.0;
   for (int k = 0; k < kMostTrials; ++k) {
     factor /= kStep;
     if (!attempt(factor, factor)) return;

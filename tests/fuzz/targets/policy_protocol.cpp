@@ -34,7 +34,8 @@ struct Choice {
 Choice choice_of(std::uint8_t options, std::uint8_t settings) {
   static constexpr std::array kThresholds = {"", ",loop_gain=0.2,pose_gain=0.2",
                                              ",loop_gain=0,pose_gain=0", ",strategy=apfl"};
-  static constexpr std::array kLinks = {"", ",gate=0.99", ",gate=0.9,trust=0", ",reuse=false"};
+  static constexpr std::array kLinks = {",reuse=true", ",reuse=true,gate=0.99",
+                                        ",reuse=true,gate=0.9,trust=0", ""};
   static constexpr std::array kOutputs = {"none", "last", "changed", "all"};
   static constexpr std::array kMarginals = {"none", "last", "diagonal", "none"};
   return {.policy = fmt::format("compact_pose:range=3,angle=1{}{}{},estimator={}",

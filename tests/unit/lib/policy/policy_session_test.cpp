@@ -36,7 +36,7 @@ class PolicySessionTest : public ::testing::Test {
   void begin() {
     number_ = 0;
     format_ = registry_.make<StreamFormat>("g2o");
-    policy_ = registry_.make<PosePolicy>("compact_pose:range=3,angle=0.8");
+    policy_ = registry_.make<PosePolicy>("compact_pose:range=3,angle=0.8,reuse=true");
     session_ = std::make_unique<PolicySession>(*policy_, *format_, registry_,
                                                PolicySettings{.read = {}, .output = "none"});
   }
@@ -352,7 +352,8 @@ TEST_F(PolicySessionTest, HoldsNoMoreHoweverLongItRuns) {
 #if defined(CAIRN_SANITIZED)
   GTEST_SKIP() << "mallinfo2 does not know the sanitizer's allocator";
 #else
-  policy_ = registry_.make<PosePolicy>("compact_pose:range=1.5,angle=1,loop_gain=1,pose_gain=1");
+  policy_ = registry_.make<PosePolicy>(
+      "compact_pose:range=1.5,angle=1,loop_gain=1,pose_gain=1,reuse=true");
   session_ = std::make_unique<PolicySession>(*policy_, *format_, registry_,
                                              PolicySettings{.read = {}, .output = "none"});
   constexpr int kPlaces = 40;  // of a circle
@@ -389,7 +390,7 @@ class PolicyTrajectory : public PolicySessionTest {
  protected:
   void drive_laps(bool trajectory) {
     format_ = registry_.make<StreamFormat>("g2o");
-    policy_ = registry_.make<PosePolicy>("compact_pose:range=3,angle=0.8,pose_gain=1.5");
+    policy_ = registry_.make<PosePolicy>("compact_pose:range=3,angle=0.8,pose_gain=1.5,reuse=true");
     session_ = std::make_unique<PolicySession>(
         *policy_, *format_, registry_,
         PolicySettings{.read = {}, .output = "none", .trajectory = trajectory});

@@ -175,7 +175,7 @@ TEST_F(RunPolicy, TheCompactPolicyStopsAnywhere) {
   const auto registration = registry.make<Registration>("recorded");
   registration->begin({.recording = &world.graph});
   for (const int poses : {1, 2, 17, 60}) {
-    const auto policy = registry.make<PosePolicy>("compact_pose:range=5,angle=3.15");
+    const auto policy = registry.make<PosePolicy>("compact_pose:range=5,angle=3.15,reuse=true");
     run_policy(world.graph, pose_chain(world.graph), *policy, *registration,
                [&](const PoseReport& report) { return report.id < poses - 1; });
     const Graph way = recovered_trajectory(*policy, Recovery::distribute);
@@ -189,7 +189,7 @@ TEST_F(RunPolicy, TheCompactPolicyStopsAnywhere) {
 TEST_F(RunPolicy, TheRecoveredWayHasEveryPoseOnceAndTheKeptOnesWhereTheyAre) {
   const Simulation world = simulate(registry, "manhattan:poses=200,streets=5");
   const PolicyRun few =
-      run(registry, world, "compact_pose:range=5,angle=3.15,pose_gain=3", "recorded");
+      run(registry, world, "compact_pose:range=5,angle=3.15,pose_gain=3,reuse=true", "recorded");
   const std::vector<Id> ids = all_ids(world.graph);
   EXPECT_LT(few.kept().size(), 150U);
   const Graph compact = few.policy->estimator().graph();

@@ -29,13 +29,9 @@ class Factors final : public OptionFinder {
   OptionValues found() const override { return {{"loop_gain", "1"}}; }
   OptionValues scaled(const OptionValues& found, double links, double poses) const override {
     EXPECT_EQ(found.at("loop_gain"), "first");
-    OptionValues values{{"loop_gain", std::to_string(links)}, {"pose_gain", std::to_string(poses)}};
-    if (found.contains("careful")) values["careful"] = found.at("careful");
-    return values;
+    return {{"loop_gain", std::to_string(links)}, {"pose_gain", std::to_string(poses)}};
   }
-  OptionValues careful() const override { return careful_options; }
   double accuracy() const override { return 0.0; }
-  OptionValues careful_options;
 };
 
 /// A world whose error and number of loops are functions of the factors.
@@ -99,42 +95,6 @@ TEST_F(RefineThresholds, LowersTheGainOfPosesWhereNoMoreLinksCome) {
               ElementsAre(near(1.0, 1.0), near(root_, 1.0), near(0.5, 1.0), near(root_, root_),
                           near(0.5, 0.5), near(0.5 * root_, 0.5 * root_)));
   EXPECT_EQ(found.options, chosen(0.5 * root_, 0.5 * root_));
-}
-
-TEST_F(RefineThresholds, TriesCarefulOptionsBeforeItLowersTheGainOfPoses) {
-  FoundThresholds found;
-  found.options = {{"loop_gain", "first"}};
-  found.tolerance = 0.4;
-  Factors finder;
-  finder.careful_options = {{"careful", "yes"}};
-  const auto test = [](const OptionValues& options, double links, double poses) {
-    return ThresholdTrial{.links = links,
-                          .poses = poses,
-                          .expected = options.contains("careful") && links < 0.8 ? 0.3 : 1.0,
-                          .loops_kept = 7};
-  };
-  refine_thresholds(finder, test, found);
-  EXPECT_THAT(tried(found), ElementsAre(near(1.0, 1.0), near(root_, 1.0), near(0.5, 1.0),
-                                        near(1.0, 1.0), near(root_, 1.0)));
-  EXPECT_EQ(found.options.at("careful"), "yes");
-}
-
-TEST_F(RefineThresholds, PrefersCarefulOptionsWhereTheErrorIsClearlySmaller) {
-  for (const double careful_error : {0.1, 0.9}) {
-    FoundThresholds found;
-    found.options = {{"loop_gain", "first"}};
-    found.tolerance = 1.0;
-    Factors finder;
-    finder.careful_options = {{"careful", "yes"}};
-    const auto test = [&](const OptionValues& options, double links, double poses) {
-      const double error = options.contains("careful") ? careful_error : links > 0.8 ? 2.0 : 1.0;
-      return ThresholdTrial{.links = links, .poses = poses, .expected = error, .loops_kept = 7};
-    };
-    refine_thresholds(finder, test, found);
-    EXPECT_THAT(tried(found), ElementsAre(near(1.0, 1.0), near(root_, 1.0), near(root_, 1.0)));
-    EXPECT_EQ(found.options.contains("careful"), careful_error < 0.5);
-    EXPECT_EQ(found.options.at("loop_gain"), std::to_string(root_));
-  }
 }
 
 TEST_F(RefineThresholds, KeepsTheLeastErrorWhereNothingIsGood) {

@@ -58,7 +58,7 @@ TEST_F(CompactPoseTest, EachStrategyTakesFewerThanTheOneBefore) {
   std::vector<std::size_t> poses, links;
   for (const std::string strategy : {"apal", "apfl", "fpfl"}) {
     const PolicyRun one =
-        run(registry, world, "compact_pose:range=3,angle=3.15,strategy=" + strategy,
+        run(registry, world, "compact_pose:range=3,angle=3.15,reuse=true,strategy=" + strategy,
             "simulated:range=3");
     poses.push_back(one.kept().size());
     links.push_back(one.links().size());

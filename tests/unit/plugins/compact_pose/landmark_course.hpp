@@ -45,7 +45,7 @@ class LandmarkCourse : public testing::TestWithParam<int> {
 
   /// A policy of these options and its first pose.
   void begin_course(const std::string& options) {
-    policy_ = registry_.make<PosePolicy>("compact_pose:" + options);
+    policy_ = registry_.make<PosePolicy>("compact_pose:reuse=true," + options);
     truth_ = {world_.identity()};
     policy_->add_pose(world_.variable(0, truth_.front(), true), {});
     all_ = {};

@@ -380,7 +380,7 @@ TEST_P(Landmarks, OfAMapAreSeenAgainInASecondSession) {
   const Graph map = policy_->estimator().graph();
   const std::vector<Id> known = policy_->landmarks();
   ASSERT_THAT(known, SizeIs(8));
-  policy_ = registry_.make<PosePolicy>("compact_pose:range=3,angle=3.15");
+  policy_ = registry_.make<PosePolicy>("compact_pose:range=3,angle=3.15,reuse=true");
   policy_->load(map);
   EXPECT_THAT(policy_->landmarks(), testing::UnorderedElementsAreArray(known));
   EXPECT_EQ(policy_->unlocated().size(), map.variable_count() - known.size());

@@ -137,7 +137,7 @@ TEST_F(LeftOutOfTheGraph, IsABearingOfALandmarkOnItsPose) {
 class LeftOutOfASession : public LeftOut {
  protected:
   void begin(const std::string& options) {
-    policy_ = registry_.make<PosePolicy>("compact_pose:" + options);
+    policy_ = registry_.make<PosePolicy>("compact_pose:reuse=true," + options);
     policy_->add_pose(world_.variable(0, world_.identity(), true), {});
   }
   PoseReport advance() {

@@ -35,9 +35,10 @@ class Lossless : public testing::TestWithParam<World> {
  protected:
   void compare(const std::string& options) {
     const auto with = [&](const std::string& search) {
-      return run(registry, world,
-                 "compact_pose:" + GetParam().range + "," + options + ",search=" + search,
-                 GetParam().registration);
+      return run(
+          registry, world,
+          "compact_pose:reuse=true," + GetParam().range + "," + options + ",search=" + search,
+          GetParam().registration);
     };
     const PolicyRun index = with("index"), all = with("all");
     ASSERT_EQ(index.reports.size(), all.reports.size());

@@ -59,7 +59,7 @@ class Priors : public testing::TestWithParam<int> {
     return step;
   }
   void begin(const std::string& options, const Pose& start, bool fixed) {
-    policy_ = registry_.make<PosePolicy>("compact_pose:range=1000,angle=3.15" +
+    policy_ = registry_.make<PosePolicy>("compact_pose:range=1000,angle=3.15,reuse=true" +
                                          (options.empty() ? "" : "," + options));
     truth_ = {start};
     all_ = {};
@@ -322,8 +322,8 @@ TEST(RecordedPriors, TheMapOfAPlaceStopsGrowing) {
       const std::array<int, 1> on{v};
       world.graph.add_factor(type, on, position, information);
     }
-    const PolicyRun run =
-        test::run(registry, world, "compact_pose:range=5,angle=0.5", "simulated:range=5,angle=0.5");
+    const PolicyRun run = test::run(registry, world, "compact_pose:range=5,angle=0.5,reuse=true",
+                                    "simulated:range=5,angle=0.5");
     kept.push_back(run.policy->kept().size());
     taken.push_back(0);
     for (const PoseReport& report : run.reports) {

@@ -51,6 +51,15 @@ TEST_F(Reuse, TheMapOfAPlaceStopsGrowing) {
   EXPECT_GT(drive(kLaps + "12", kPolicy + "false", kSensor).policy->kept().size(), 4 * kept[1]);
 }
 
+TEST_F(Reuse, IsOffUnlessAskedFor) {
+  const auto kept = [&](const std::string& policy) {
+    return drive(kLaps + "6", policy, kSensor).kept();
+  };
+  const auto by_default = kept("compact_pose:range=4,angle=0.4");
+  EXPECT_EQ(by_default, kept(kPolicy + "false"));
+  EXPECT_GT(by_default.size(), 2 * kept(kPolicy + "true").size());
+}
+
 /// Whatever a match is worth beside a step of odometry (0.02 m, 0.005 rad), with nothing said of
 /// it: it is learnt from those that come back.
 TEST_F(Reuse, TheMapStopsGrowingWhateverAMatchIsWorth) {
@@ -63,7 +72,7 @@ TEST_F(Reuse, TheMapStopsGrowingWhateverAMatchIsWorth) {
           "ellipse_n:poses_per_lap=40,loop_density=0,translation_error=0,rotation_error=0,"
           "translation_sigma=0.02,rotation_sigma=0.005,laps=" +
               std::to_string(laps),
-          "compact_pose:range=5,angle=0.5", "simulated:range=5,angle=0.5" + sigmas);
+          "compact_pose:range=5,angle=0.5,reuse=true", "simulated:range=5,angle=0.5" + sigmas);
       kept.push_back(some.policy->kept().size());
       std::int64_t asked = 0;
       for (const PoseReport& report : some.reports) asked += std::ssize(report.links);
@@ -78,7 +87,7 @@ TEST_F(Reuse, WithoutNoiseTheMapIsTheTruth) {
   const PolicyRun one = drive(
       "ellipse_n:poses_per_lap=40,laps=6,loop_density=0,translation_sigma=1e-6,rotation_sigma=1e-6,"
       "translation_error=0,rotation_error=0",
-      "compact_pose:range=4,angle=0.4,sensor=0.00001 0.00001",
+      kPolicy + "true,sensor=0.00001 0.00001",
       "simulated:range=4,angle=0.4,"
       "sigma_translation=0.000001,sigma_rotation=0.000001");
   EXPECT_THAT(one.kept().size(), Lt(100U));
@@ -109,7 +118,7 @@ TEST_F(Reuse, WhereItCostsMuchAPoseIsKept) {
 
 TEST_F(Reuse, EveryPoseComesBackOnce) {
   const PolicyRun one = drive("manhattan:poses=400,streets=4,loop_density=0",
-                              "compact_pose:range=3,angle=3.15", "simulated:range=3");
+                              "compact_pose:range=3,angle=3.15,reuse=true", "simulated:range=3");
   EXPECT_LT(one.policy->kept().size(), 250U);
   const Graph way = recovered_trajectory(*one.policy, Recovery::likely);
   const std::vector<Id> all = all_ids(simulation_.graph);
@@ -152,7 +161,7 @@ TEST(ReadingAPolicy, ChangesNoLaterResult) {
   Registry registry;
   const Simulation world = simulate(registry, "manhattan:poses=250");
   const auto end_of = [&](bool read) {
-    const auto policy = registry.make<PosePolicy>("compact_pose:range=3,angle=0.8");
+    const auto policy = registry.make<PosePolicy>("compact_pose:range=3,angle=0.8,reuse=true");
     const auto registration = registry.make<Registration>("recorded");
     registration->begin({.recording = &world.graph, .truth = &world.truth});
     int reads = 0;

@@ -58,7 +58,8 @@ class Revoking : public testing::TestWithParam<int> {
   }
 
   /// Locates its first pose.
-  std::unique_ptr<PosePolicy> policy(const std::string& options = "pose_gain=1e9,reuse_loss=10") {
+  std::unique_ptr<PosePolicy> policy(
+      const std::string& options = "reuse=true,pose_gain=1e9,reuse_loss=10") {
     Draw draw(17);
     Graph map;
     for (int k = 0; k < kPlaces; ++k) {
@@ -273,8 +274,8 @@ TEST_P(Revoking, AllLinksInAnyOrder) {
   for (int trial = 0; trial < 12; ++trial) {
     // Covariances of the fourth order depend a little on which are composed first.
     const bool fourth = trial % 3 == 2;
-    const std::string options =
-        std::string("pose_gain=1e9,reuse_loss=10") + (fourth ? ",composition=fourth" : "");
+    const std::string options = std::string("reuse=true,pose_gain=1e9,reuse_loss=10") +
+                                (fourth ? ",composition=fourth" : "");
     const auto with = policy(options), without = policy(options);
     std::vector<std::pair<Id, Id>> links;
     std::vector<Id> to{0, kMap + 4, kMap + 5, kMap + 9};
@@ -353,7 +354,8 @@ TEST(RevokingWherePosesLeave, IsRefusedWhereItCannotBeToldApart) {
   Registry registry;
   const Simulation world =
       test::simulate(registry, "ellipse_n:poses_per_lap=40,loop_density=0,laps=6");
-  const auto policy = registry.make<PosePolicy>("compact_pose:range=4,angle=0.4,keep=20");
+  const auto policy =
+      registry.make<PosePolicy>("compact_pose:range=4,angle=0.4,keep=20,reuse=true");
   const auto registration = registry.make<Registration>("simulated:range=4,angle=0.4");
   registration->begin({.recording = &world.graph, .truth = &world.truth});
   std::vector<std::pair<Id, Id>> links;

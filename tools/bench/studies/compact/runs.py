@@ -17,7 +17,8 @@ from ...rounds import Contestant
 from ...study import Bench
 from ...words import percent, times
 
-AS_PUBLISHED = "compact_pose:reuse=false"  # Algorithm 1 of the paper, without relocation
+AS_PUBLISHED = "compact_pose:reuse=false"  # Algorithm 1 of the paper, without relocation, as by default
+RELOCATING = "compact_pose:reuse=true"
 # Policy of APAL: no pair of poses is tested for being near (s = 0), so that every loop closure of a recording is found.
 ALL_LOOPS = "compact_pose:search=recorded"
 
@@ -84,8 +85,8 @@ BY_RULE = ["--error-ratio", "0", "--policy", AS_PUBLISHED]  # of section 5.2 alo
 
 
 def find_three_thresholds(bench: Bench, data: DataSet) -> dict[str, Thresholds]:
-    """As by default; without relocation; and as published: without relocation, and by the rule of section 5.2 alone."""
-    return {"refined": find_thresholds(bench, data, "refined"),
+    """With relocation; without it, as by default; and as published: without relocation, and by the rule of section 5.2 alone."""
+    return {"refined": find_thresholds(bench, data, "refined", ["--policy", RELOCATING]),
             "plain": find_thresholds(bench, data, "plain", ["--policy", AS_PUBLISHED]),
             "by_rule": find_thresholds(bench, data, "by_rule", BY_RULE)}
 
@@ -95,8 +96,8 @@ def contestants_with(thresholds: dict[str, Thresholds], limit: float, enough: fl
     def one(name: str, strategy: str, of: str, more: Words) -> Contestant:
         return Contestant(name, ["--strategy", strategy, "--thresholds", thresholds[of].file, *more], limit, enough)
     published = ["--policy", AS_PUBLISHED]
-    return [one("tested", "apal", "refined", []), one("fpfl", "fpfl", "refined", []), one("plain", "fpfl", "plain", published),
-            one("by_rule", "fpfl", "by_rule", published)]
+    return [one("tested", "apal", "refined", []), one("fpfl", "fpfl", "refined", ["--policy", RELOCATING]),
+            one("plain", "fpfl", "plain", published), one("by_rule", "fpfl", "by_rule", published)]
 
 
 def run_seeds(bench: Bench, data: DataSet, contestant: Contestant, seeds: int,

@@ -206,9 +206,6 @@ class CAIRN_API OptionFinder {
   virtual OptionValues found() const = 0;
   /// A choice that accepts more than `found` (factors < 1) or less (> 1): of links, and of poses.
   virtual OptionValues scaled(const OptionValues& found, double links, double poses) const = 0;
-  /// Options that make the estimate better and the graph larger, for where thresholds alone do not
-  /// make it good enough; none, unless a finder has some.
-  virtual OptionValues careful() const { return {}; }
   /// How accurate a link of the sample is: root mean square of its translation's error [m]. Errors
   /// below that are negligible.
   virtual double accuracy() const = 0;

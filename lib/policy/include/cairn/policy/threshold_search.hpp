@@ -71,12 +71,9 @@ using ThresholdTest =
 
 /// Lowers thresholds until the error of a trial is within `found.tolerance`: first the gains of
 /// links, by factors of √2 and at most ten times, until lower ones let no more links through (none
-/// at all is no reason to stop); then the same with the finder's `careful` options, if it has some;
-/// then the gains of links and poses together, from the beginning. Where the first of these is
-/// good, the careful options are tried with the same thresholds, and taken if the error is below
-/// 0.8 of it. `found.options` are what was found at first, and become those of the first trial that
-/// is good or, if none is, of that with the least error. Stops early once `interrupted` returns
-/// true.
+/// at all is no reason to stop); then the gains of links and poses together, from the beginning.
+/// `found.options` are what was found at first, and become those of the first trial that is good
+/// or, if none is, of that with the least error. Stops early once `interrupted` returns true.
 CAIRN_API void refine_thresholds(const OptionFinder& finder, const ThresholdTest& test,
                                  FoundThresholds& found,
                                  const std::function<bool()>& interrupted = {});
