@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "blanket_matrices.hpp"
-#include "cairn/linear/graph_marginals.hpp"
 #include "dense/cholesky.hpp"
 #include "dense/products.hpp"
 
@@ -46,10 +45,8 @@ std::optional<Matrix> relative(const DenseBlanket& blanket) {
 
 }  // namespace
 
-std::optional<Matrix> joint_covariance(const Graph& graph, LinearSolver& solver,
-                                       std::span<const int> variables) {
-  GraphMarginals marginals(graph, solver);
-  if (!marginals.factorize().ok) return std::nullopt;
+Matrix joint_covariance(const Graph& graph, GraphMarginals& marginals,
+                        std::span<const int> variables) {
   std::vector<std::pair<int, int>> pairs;
   std::vector<Eigen::Index> begin{0};
   for (std::size_t i = 0; i < variables.size(); ++i) {

@@ -9,7 +9,7 @@
 
 #include "approximation.hpp"
 #include "cairn/graph/graph.hpp"
-#include "cairn/linear/linear_solver.hpp"
+#include "cairn/linear/graph_marginals.hpp"
 #include "cairn/runtime/enum_names.hpp"
 #include "cairn/sparsification/blanket.hpp"
 #include "cairn/sparsification/recovery.hpp"
@@ -28,10 +28,10 @@ constexpr auto enum_names(Fit) {
       {{Fit::blanket, "blanket"}, {Fit::scaled, "scaled"}, {Fit::graph, "graph"}});
 }
 
-/// Joint covariance of variables (by index), d × d, in the graph as it is; zero for those that are
-/// constant. Nothing where the graph's information is singular.
-std::optional<Matrix> joint_covariance(const Graph& graph, LinearSolver& solver,
-                                       std::span<const int> variables);
+/// Joint covariance of variables (by index), d × d, in a graph whose marginals are factorised; zero
+/// for those that are constant.
+Matrix joint_covariance(const Graph& graph, GraphMarginals& marginals,
+                        std::span<const int> variables);
 
 /// Covariance S of what Λ of a blanket is about, r × r: the whole where it is absolute, and
 /// otherwise all nodes relative to the first one. With Λ (I, X) = 0, X = −Λ_rr⁻¹ Λ_r0, that is

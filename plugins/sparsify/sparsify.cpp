@@ -186,10 +186,26 @@ void Sparsify::recover(const Recovered& of, Solved& solved, SparsificationSecond
         solved.recovery);
 }
 
-/// What the whole graph, as it is now, knows of a blanket; empty where that is not asked for, or
-/// not determined, which is noted.
+/// The whole graph as it was when at most a hundredth of its variables fewer had left.
+Sparsify::WholeGraph& Sparsify::whole_graph(const WorkGraph& work) {
+  constexpr int kPart = 100;
+  const Graph& graph = work.graph();
+  int there = 0;
+  for (int v = 0; v < graph.variable_count(); ++v) there += !work.gone(v);
+  if (whole_ && whole_->graph.variable_count() - there <= graph.variable_count() / kPart)
+    return *whole_;
+  Sparsification so_far;
+  collect(work, so_far);
+  Graph now = graph.clone();
+  if (!so_far.removed_variables.empty()) apply(so_far, now);
+  whole_ = std::make_unique<WholeGraph>(std::move(now), *solver_);
+  return *whole_;
+}
+
+/// What the whole graph knows of a blanket; empty where that is not asked for, or not determined,
+/// which is noted.
 Matrix Sparsify::known_in_graph(const WorkGraph& work, const LocalProblem& local, Solved& solved,
-                                SparsificationSeconds& seconds) const {
+                                SparsificationSeconds& seconds) {
   if (options_.fit == Fit::blanket) return {};
   const Timed timed(seconds.covariance);
   const auto by_itself = [&](const char* reason) {
@@ -197,21 +213,12 @@ Matrix Sparsify::known_in_graph(const WorkGraph& work, const LocalProblem& local
     return Matrix();
   };
   if (solved.marginal.open > 0) return by_itself("what leaves does not determine the neighbours");
-  const Graph& graph = work.graph();
-  Sparsification so_far;
-  collect(work, so_far);
-  std::optional<Matrix> joint;
-  if (so_far.removed_variables.empty()) {
-    joint = joint_covariance(graph, *solver_, local.blanket);
-  } else {
-    Graph now = graph.clone();
-    apply(so_far, now);
-    std::vector<int> there;
-    for (const int v : local.blanket) there.push_back(now.find(graph.id(v)).value());
-    joint = joint_covariance(now, *solver_, there);
-  }
-  if (!joint) return by_itself("the information of the whole graph is singular");
-  const std::optional<Matrix> own = own_covariance(solved.marginal.dense, *joint);
+  WholeGraph& whole = whole_graph(work);
+  if (!whole.regular) return by_itself("the information of the whole graph is singular");
+  std::vector<int> there;
+  for (const int v : local.blanket) there.push_back(whole.graph.find(work.graph().id(v)).value());
+  const Matrix joint = joint_covariance(whole.graph, whole.marginals, there);
+  const std::optional<Matrix> own = own_covariance(solved.marginal.dense, joint);
   return own ? *own : by_itself("its covariance in the whole graph is singular");
 }
 
@@ -398,6 +405,7 @@ Sparsification Sparsify::remove(const Graph& graph, std::span<const int> nodes,
   Sparsification result;
   const Timed timed(result.seconds.total);
   WorkGraph work(graph);
+  whole_ = nullptr;
   int done = 0;
   Clock::time_point asked = Clock::now();
   const Watched watched(*topology_, *recovery_, [&] {

@@ -6,8 +6,10 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "cairn/linear/graph_marginals.hpp"
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/plugin/option_fields.hpp"
 #include "cairn/sparsification/recovery.hpp"
@@ -119,12 +121,23 @@ class Sparsify final : public Sparsifier {
     BlanketProjection coordinates;
   };
   LocalProblem cropped(const WorkGraph& work, std::vector<int> group) const;
+  /// What is known in the whole graph, for `Fit` other than `blanket`: as it was a little before,
+  /// since what leaves hardly changes what is known of the others, and each factorisation takes as
+  /// long as the graph is large.
+  struct WholeGraph {
+    WholeGraph(Graph now, LinearSolver& solver)
+        : graph(std::move(now)), marginals(graph, solver), regular(marginals.factorize().ok) {}
+    Graph graph;
+    GraphMarginals marginals;
+    bool regular;
+  };
   /// `in_graph`: as `SparsifyOptions::fit` says; otherwise by the cropped problem alone.
   Solved solve(const WorkGraph& work, const LocalProblem& local, SparsificationSeconds& seconds,
                bool in_graph);
   void check_fit() const;
+  WholeGraph& whole_graph(const WorkGraph& work);
   Matrix known_in_graph(const WorkGraph& work, const LocalProblem& local, Solved& solved,
-                        SparsificationSeconds& seconds) const;
+                        SparsificationSeconds& seconds);
   Recovered prepared(const DenseBlanket& dense, Matrix own_covariance,
                      SparsificationSeconds& seconds) const;
   void recover(const Recovered& of, Solved& solved, SparsificationSeconds& seconds);
@@ -139,6 +152,7 @@ class Sparsify final : public Sparsifier {
   std::unique_ptr<FactorRecovery> recovery_;
   SparsifyOptions options_;
   std::unique_ptr<LinearSolver> solver_;
+  std::unique_ptr<WholeGraph> whole_;  ///< of the graph that nodes are removed from
   SparsificationObserver observer_;
   struct PairType {
     std::shared_ptr<const FactorType> relative;
