@@ -594,7 +594,8 @@ TEST_F(Compact, SaysWhatIsWrongAndWhatWouldWork) {
   EXPECT_THAT(refused({kWorld, "--thresholds", told}, 3),
               AllOf(HasSubstr("this is the report of a run of cairn compact (--json)"),
                     HasSubstr("give a file that cairn compact --save-thresholds has written")));
-  EXPECT_THAT(refused({"@manhattan:poses=20,loop_density=0"}, 3), HasSubstr("no loop closure"));
+  EXPECT_THAT(refused({"@manhattan:poses=20,loop_density=0"}, 3),
+              HasSubstr("the recording has no loop closure: there is nothing to close"));
   EXPECT_THAT(refused({kWorld, "--policy", "compact_pose:rage=3"}, 2), HasSubstr("range"));
   EXPECT_THAT(refused({kWorld, "--policy", "random_poses:poses=10", "--auto"}, 2),
               HasSubstr("does not find its options"));

@@ -210,7 +210,7 @@ def test_the_whole_map_is_the_estimate_of_all_measurements():
     result = cairn.compact(graph)
     everything = graph.copy()
     cairn.optimize(everything)
-    assert result.strategy == "whole" and result.graph.variable_count < 150 and result.trajectory.factor_count == 0
+    assert result.strategy == "whole" and "reuse=true" in result.policy and result.graph.variable_count < 150 and result.trajectory.factor_count == 0
     assert_allclose(result.trajectory.states(Pose2), everything.states(Pose2), atol=1e-6)
     alone = result.graph.copy()
     cairn.optimize(alone, initial=None)
@@ -227,6 +227,10 @@ def test_where_there_is_no_whole_map_it_says_why():
             cairn.compact(graph, strategy="whole", **arguments, **OPTIONS)
     with pytest.raises(cairn.Error, match="give one"):
         cairn.compact(graph, "compact_pose:strategy=apfl", strategy="whole", **OPTIONS)
+    with pytest.raises(cairn.Error, match="did you mean 'whole'"):
+        cairn.compact(graph, strategy="wole", **OPTIONS)
+    with pytest.raises(cairn.Error, match="apal, apfl, fpfl, whole"):
+        cairn.compact(graph, strategy="everything", **OPTIONS)
     wrong, _ = cairn.generate("manhattan", seed=3, poses=100, outliers=400)
     result = cairn.compact(wrong)
     assert result.strategy == "fpfl" and any("measurements contradict each other" in note for note in result.notes), result.notes

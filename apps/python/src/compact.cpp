@@ -28,6 +28,7 @@
 #include "cairn/runtime/enum_names.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/sparsification/whole_map.hpp"
+#include "cairn/text/spelling.hpp"
 #include "component_names.hpp"
 #include "follower.hpp"
 #include "interrupt.hpp"
@@ -83,10 +84,18 @@ std::string strategy_of(const Plan& plan, const PolicySetting& setting) {
     }
     return own->second;
   }
-  const bool has_some =
-      setting.registry.options(PosePolicy::kKind, policy.name).find("strategy") != nullptr;
+  const OptionSpec* const has_some =
+      setting.registry.options(PosePolicy::kKind, policy.name).find("strategy");
   if (!has_some && !plan.strategy.empty())
     throw Error(ErrorCode::usage, fmt::format("policy '{}' has no strategies", policy.name));
+  if (!plan.strategy.empty()) {
+    std::vector<std::string> names = has_some->choices;
+    names.emplace_back(kWhole);
+    if (std::ranges::find(names, plan.strategy) == names.end()) {
+      throw Error(ErrorCode::usage, fmt::format("strategy cannot be '{}'{}", plan.strategy,
+                                                what_is_on_offer(plan.strategy, names)));
+    }
+  }
   if (!has_some || (!plan.strategy.empty() && plan.strategy != kWhole)) return plan.strategy;
   const std::string why_not =
       plan.map ? "the trajectory continues a map (map=)" : why_no_whole_map(plan.job, setting);

@@ -14,6 +14,7 @@
 
 #include "cairn/geometry/pose.hpp"
 #include "cairn/geometry/pose_chain.hpp"
+#include "cairn/graph/gauge.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/update/graph_update.hpp"
 
@@ -199,6 +200,24 @@ void separate(std::vector<int>& links, std::vector<int>& others, const Chosen& c
   links.erase(first, links.end());
 }
 
+/// Says why there is no odometry from a pose to the next by id.
+[[noreturn]] void refuse_gap(const Graph& graph, int before, int pose) {
+  const Gauge gauge = resolve_gauge(graph);
+  const std::string here = graph.describe_variable(pose), there = graph.describe_variable(before);
+  if (gauge.component[pose] != gauge.component[before]) {
+    throw bad_input(fmt::format(
+        "no measurements lead from {} to {}, the next by id: the graph has {} parts whose relative "
+        "poses are unknown, and a trajectory is one of them; give each part in a file of its own, "
+        "or the pose at which to begin (begin={}), without those before it",
+        there, here, gauge.components, graph.id(pose)));
+  }
+  throw bad_input(fmt::format(
+      "no factor joins {} to {}, the pose before it by id: odometry must be unbroken and ids "
+      "increase along the trajectory; if the poses before it are of an earlier session, give the "
+      "first one of this session, at which to begin (begin={})",
+      here, there, graph.id(pose)));
+}
+
 }  // namespace
 
 std::vector<Arrival> pose_chain(const Graph& graph, std::optional<Id> begin) {
@@ -220,13 +239,7 @@ std::vector<Arrival> pose_chain(const Graph& graph, std::optional<Id> begin) {
     chain.front().odometry.clear();
   }
   for (std::size_t k = 1; k < chain.size(); ++k) {
-    if (!chain[k].odometry.empty()) continue;
-    throw bad_input(fmt::format(
-        "no factor joins {} to {}, the pose before it by id: odometry must be unbroken and ids "
-        "increase along the trajectory; if the poses before it are of an earlier session, give the "
-        "first one of this session, at which to begin (begin={})",
-        graph.describe_variable(chain[k].pose()), graph.describe_variable(chain[k - 1].pose()),
-        graph.id(chain[k].pose())));
+    if (chain[k].odometry.empty()) refuse_gap(graph, chain[k - 1].pose(), chain[k].pose());
   }
   return chain;
 }

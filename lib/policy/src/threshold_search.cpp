@@ -174,6 +174,13 @@ FoundThresholds find_thresholds(const PolicyJob& job, std::size_t count, double 
   const bool recorded_only =
       job.own ? job.own->matches_recorded_only()
               : setting.registry.make<Registration>(job.registration)->matches_recorded_only();
+  if (recorded_only && setting.data.loops == 0) {
+    throw Error(
+        ErrorCode::input,
+        "the recording has no loop closure: there is nothing to close, nor anything in "
+        "which thresholds could be found; to keep fewer poses all the same, give the sensor's "
+        "range, or use sparsify");
+  }
   for (const auto& [name, value] : finder_of(*chosen, job).watching(recorded_only))
     watching.policy.values.insert_or_assign(name, value);
   PolicyRun watch(watching, setting);

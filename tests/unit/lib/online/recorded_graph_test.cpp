@@ -249,6 +249,14 @@ TEST_F(PoseChain, NamesTheGapInItsOdometry) {
                                HasSubstr("ids increase along the trajectory")));
 }
 
+TEST_F(PoseChain, SaysWhereTheGraphIsInParts) {
+  for (const Id id : {1, 2, 5, 6}) pose(id);
+  join(1, 2), join(5, 6);
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("no measurements lead from VERTEX_SE2 2 to VERTEX_SE2 5"),
+                               HasSubstr("2 parts"), HasSubstr("(begin=5)")));
+  EXPECT_THAT(pose_chain(graph_, 5), SizeIs(2));
+}
+
 TEST_F(PoseChain, HasTheAbsoluteMeasurementsOfEachPose) {
   for (const Id id : {1, 2, 3}) pose(id);
   join(1, 2), join(2, 3), join(1, 3);
