@@ -106,22 +106,36 @@ int asked(const char* variable, int otherwise) {
   return text ? std::atoi(text) : otherwise;
 }
 
+/// What the simulated lidar has beside the noise that is said of it.
+struct Disturbance {
+  double person = 0.0;            ///< width of one who stands in one of the two scans [m]; 0: none
+  double bias = 0.0, step = 0.0;  ///< of all ranges [m]
+};
+
 /// CAIRN_ICP_PAIRS: so many pairs instead of 200; CAIRN_ICP_SEED. By `icp`, or the registration of
 /// that name.
-std::vector<Outcome> study(const std::string& floor, bool good_guess, const std::string& by = {}) {
+std::vector<Outcome> study(const std::string& floor, bool good_guess, const std::string& by = {},
+                           const Disturbance& disturbance = {}) {
   const int pairs = asked("CAIRN_ICP_PAIRS", 200);
   const auto seed = static_cast<std::uint64_t>(asked("CAIRN_ICP_SEED", 11));
   Registry registry;
   const OccupancyGrid grid =
       read_grid((test::data_folder() / "maps" / (floor + ".yaml")).string(), registry);
   test::ScanPairs drawn(grid, seed);
-  test::Sampler random(seed + 1);
+  test::Sampler random(seed + 1), disturbed(seed + 2);
   const ScanMatcher matcher;
   const auto registration = by.empty() ? nullptr : registry.make<Registration>(by);
   std::vector<Outcome> all;
   for (int k = 0; k < pairs; ++k) {
     const double sigma = random.uniform(0.01, 0.05);
-    const test::ScanPair pair = drawn.draw({.sigma = sigma}, kPoor, good_guess ? kGood : kPoor);
+    test::ScanPair pair = drawn.draw({.sigma = sigma}, kPoor, good_guess ? kGood : kPoor);
+    if (disturbance.person > 0.0) {
+      LaserScan& scan = disturbed.uniform(0.0, 1.0) < 0.5 ? pair.earlier : pair.later;
+      test::put_person_in(scan, disturbance.person, sigma, disturbed);
+    }
+    for (LaserScan* const scan : {&pair.earlier, &pair.later})
+      if (disturbance.bias != 0.0 || disturbance.step != 0.0)
+        test::distort(*scan, disturbance.bias, disturbance.step);
     all.push_back(registration ? outcome_of(pair, *registration)
                                : outcome_of(pair, matcher, good_guess));
     all.back().sigma = sigma;
@@ -233,6 +247,26 @@ TEST_P(FloorsStudy, AGoodGuessNeedsNoSearch) {
   EXPECT_GT(sum.right, 0.75);
   EXPECT_LE(sum.wrong, 0.015);
   EXPECT_LE(sum.far_off, 0.005);
+}
+
+/// The same pairs with what the simulated lidar has not: a person in one of the two scans; ranges
+/// that are 2 cm too long, in steps of 1 cm. More matches are wrong then, or rejected; bars are for
+/// what is measured (docs/icp.md).
+TEST_P(FloorsStudy, WhatAPersonAndABiasDo) {
+  CAIRN_NEEDS_DATA();
+  CAIRN_NEEDS("grid_format", "ros");
+  const std::string floor = GetParam();
+  const Summary person = summary_of(study(floor, false, {}, {.person = 0.5})),
+                bias = summary_of(study(floor, false, {}, {.bias = 0.02, .step = 0.01})),
+                bias_alone = summary_of(study(floor, false, {}, {.bias = 0.02}));
+  print(floor + ", a person", person);
+  print(floor + ", a bias, in steps", bias);
+  print(floor + ", a bias", bias_alone);
+  EXPECT_LE(person.wrong, 0.03);
+  EXPECT_LE(bias.wrong, 0.03);
+  EXPECT_LE(bias_alone.wrong, 0.03);
+  EXPECT_GT(person.right, 0.1);  // in a hall wider than the range little is left in common
+  EXPECT_GT(bias.right, 0.6);
 }
 
 // The same pairs by MRPT, where it is built in (CAIRN_MRPT). CAIRN_ICP_MRPT: with options, such as

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 namespace cairn::test {
 namespace {
@@ -35,6 +36,38 @@ std::vector<bool> clear_cells(const OccupancyGrid& floor) {
 }
 
 }  // namespace
+
+bool put_person_in(LaserScan& scan, double width, double sigma, Sampler& random) {
+  constexpr int kTries = 100, kFewest = 3;  // beams
+  const double radius = 0.5 * width;
+  for (int tries = 0; tries < kTries; ++tries) {
+    const double away = random.uniform(1.0, 2.5);
+    const double towards = random.uniform(scan.angle(0), scan.angle(scan.ranges.size() - 1));
+    std::vector<std::pair<std::size_t, double>> hits;
+    for (std::size_t beam = 0; beam < scan.ranges.size(); ++beam) {
+      const double aside = away * std::sin(scan.angle(beam) - towards);
+      const double along = away * std::cos(scan.angle(beam) - towards);
+      if (along <= 0.0 || std::abs(aside) >= radius) continue;
+      const double range = along - std::sqrt(radius * radius - aside * aside);
+      if (range < static_cast<double>(scan.ranges[beam])) hits.emplace_back(beam, range);
+    }
+    if (std::ssize(hits) < kFewest) continue;
+    for (const auto& [beam, range] : hits) {
+      const double noise = sigma * std::sqrt(12.0) * (random.uniform(0.0, 1.0) - 0.5);
+      scan.ranges[beam] = static_cast<float>(range + noise);
+    }
+    return true;
+  }
+  return false;
+}
+
+void distort(LaserScan& scan, double bias, double step) {
+  for (float& range : scan.ranges) {
+    if (static_cast<double>(range) >= scan.max_range) continue;  // nothing in range
+    const double measured = static_cast<double>(range) + bias;
+    range = static_cast<float>(step > 0.0 ? step * std::round(measured / step) : measured);
+  }
+}
 
 ScanPairs::ScanPairs(const OccupancyGrid& floor, std::uint64_t seed)
     : frame_(floor.frame), caster_(floor), clear_(clear_cells(floor)), random_(seed) {

@@ -26,6 +26,13 @@ struct PairRange {
   double angle = 0.35;    ///< [rad]
 };
 
+/// A round person in view of the lidar, 1 to 2.5 m from it: stands anywhere that some beams reach.
+/// False: there is no such place.
+bool put_person_in(LaserScan& scan, double width, double sigma, Sampler& random);
+
+/// Ranges that are too long by `bias`, and are measured in steps, as cheap lidars do [m].
+void distort(LaserScan& scan, double bias, double step);
+
 /// Draws pairs of scans on a floor: the first pose anywhere that is at least 0.25 m from what is
 /// not free, with any heading; the second near it, with a line of sight between them.
 class ScanPairs {
