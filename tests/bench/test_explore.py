@@ -119,12 +119,16 @@ class ThesisTest(unittest.TestCase):
     def test_claims_are_seen_not_seen_or_not_measured(self):
         table = section(report(
             "explore_cave",
-            entry("cave", "frontier", {"map_entropy": 50.0, "seconds": 3.0}, {"map_entropy": 52.0, "seconds": 4.0}),
-            entry("cave", "ede_gradient", {"map_entropy": 51.0, "loops": 50.0, "seconds": 1.0},
-                  {"map_entropy": 51.0, "loops": 50.0, "seconds": 2.0}),
-            entry("cave", "ede_rrt_star", {"map_entropy": 51.0, "seconds": 1.1}, {"map_entropy": 51.0, "seconds": 2.1})),
+            entry("cave", "frontier", {"map_entropy": 50.0, "seconds": 3.0, "seen": 240.0},
+                  {"map_entropy": 52.0, "seconds": 4.0, "seen": 260.0}),
+            entry("cave", "ede_gradient", {"map_entropy": 51.0, "loops": 50.0, "seconds": 1.0, "seen": 299.0},
+                  {"map_entropy": 51.0, "loops": 50.0, "seconds": 2.0, "seen": 299.0}),
+            entry("cave", "ede_rrt_star", {"map_entropy": 51.0, "seconds": 1.1, "seen": 299.0},
+                  {"map_entropy": 51.0, "seconds": 2.1, "seen": 299.0})),
             "explore-cave-claims")
         self.assertIn("similar map entropy (within 10 %) | seen", table)
+        self.assertIn("full coverage (285 of the 300 m² seen) | not seen | seen: 285 − frontier = +35 ± 127", table)
+        self.assertIn("many collisions (at least one per run) | not seen | collisions: 1 − frontier = +1.000 ± 0.000 |", table)
         self.assertIn("close a similar number of loops (within 50 %) | not seen | loops: ede_gradient − 1.50 · frontier = "
                       "+20.00 ± 0.00", table)
         self.assertIn("| both EDE take less time | seen, clear of zero |", table)
