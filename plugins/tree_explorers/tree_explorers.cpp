@@ -34,6 +34,7 @@ using Eigen::Vector2d;
 struct TreeExplorerOptions {
   double density = 5.0, step = 0.5, reach = 1.0;
   double least_gain = 0.0, replan = 0.9;
+  int revisits = 3;
   std::string fallback = "frontier";
   PathValueOptions value = {};
 
@@ -50,6 +51,9 @@ struct TreeExplorerOptions {
         .real("replan", &O::replan, 0.0, 1.0,
               "decides anew when this part of the cells is known that the path was expected to "
               "discover; 1 and paths with loop closures: at its end")
+        .integer("revisits", &O::revisits, 0, 1000000,
+                 "so many paths in a row may bring hardly any floor; then the fallback decides, "
+                 "until more is found; 0: any number, as in the thesis")
         .text("fallback", &O::fallback,
               "explorer that decides where no path counts, frontier:length=2 for instance; none: "
               "the run ends there");
@@ -71,6 +75,8 @@ constexpr double kGrowthPart = 0.3, kTreePart = 0.8;
 constexpr double kLeastPart = 0.2;
 /// Paths of a tree that are evaluated exactly at least, the best ones by their estimates.
 constexpr std::size_t kEvaluated = 32;
+/// A path that brings no more than this has only closed loops [m²].
+constexpr double kLittleFloor = 0.5;
 /// Further candidates that a decision lists, and how far their ends are apart [m].
 constexpr std::size_t kListed = 10;
 constexpr double kApart = 1.0;
@@ -113,6 +119,8 @@ class TreeExplorer : public Explorer {
     random_.emplace(seed, RandomStream::Purpose::explorer);
     discovery_ = {};
     by_fallback_ = false;
+    revisits_ = 0;
+    covered_ = 0.0;
     if (fallback_) fallback_->begin(seed);
   }
 
@@ -122,6 +130,8 @@ class TreeExplorer : public Explorer {
     by_fallback_ = false;
     const FreeSpace space(situation.map, situation.pose.translation(), situation.robot.radius);
     if (space.empty()) return otherwise(situation, "the robot does not fit where it is", {});
+    if (const std::string why = fallback_ ? why_done(situation) : ""; !why.empty())
+      return otherwise(situation, why, {});
     const std::vector<Vector2d> left_out =
         discovery_.not_found(situation, options_.value.simulated_range);
     PathValue value(situation, options_.value, left_out);
@@ -235,6 +245,22 @@ class TreeExplorer : public Explorer {
     return candidate;
   }
 
+  /// Why the fallback decides, whatever paths are worth: there is always more to know about a
+  /// trajectory, and through the gaps of a ragged wall floor is expected that is none. Else empty.
+  std::string why_done(const Situation& situation) {
+    const std::vector<Frontier>& frontiers = situation.map.frontiers;  // longest first
+    if (frontiers.empty() || frontiers.front().length < 2.0 * situation.robot.radius)
+      return "no frontier is as wide as the body";
+    const double coverage = situation.map.coverage();
+    if (coverage > covered_ + kLittleFloor) {
+      covered_ = coverage;
+      revisits_ = 0;
+    } else if (options_.revisits > 0 && ++revisits_ > options_.revisits) {
+      return fmt::format("{} paths in a row brought hardly any floor", options_.revisits);
+    }
+    return {};
+  }
+
   /// What is decided where no path counts.
   Decision otherwise(const Situation& situation, const std::string& why, Decision searched) {
     discovery_.expect({}, 2.0);
@@ -257,6 +283,8 @@ class TreeExplorer : public Explorer {
   std::unique_ptr<Explorer> fallback_;
   Discovery discovery_;
   bool by_fallback_ = false;  ///< the last decision
+  int revisits_ = 0;          ///< decisions in a row since floor was discovered
+  double covered_ = 0.0;      ///< of the map then [m²]
 };
 
 /// A tree of short paths, each of which is evaluated when it is grown.
