@@ -47,7 +47,7 @@ struct ExploreOptions {
   std::string floor;
   std::string world = ExplorationSetup::kWorld, lidar, odometry;
   SlamNames slam{.policy = ExplorationSetup::kPolicy};
-  std::string explorer = "frontier";
+  std::string explorer = ExplorationSetup::kExplorer;
   std::string until, match;
   double decision_budget = std::numeric_limits<double>::infinity();  // [s]
   ComparisonOptions comparison;
@@ -395,7 +395,8 @@ Command add_explore(ArgumentParser program) {
       .type_name("FILE");
   add_recording_options(cli, options->recording);
   cli.add_option("--explorer", options->explorer,
-                 "decides where to drive; options as NAME:k=v; several, A,B, are compared")
+                 "decides where to drive; options as NAME:k=v; several, A,B, are compared; frontier "
+                 "finishes small floors sooner")
       .components({"explorer"})
       .show_default();
   cli.add_option(

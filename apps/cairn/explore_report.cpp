@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -20,6 +21,29 @@ namespace json = boost::json;
 std::optional<TrajectoryError> error_of(const ExplorationResult& result) {
   if (result.truth_trajectory.variable_count() < 3) return std::nullopt;
   return compare(trajectory(result.trajectory), trajectory(result.truth_trajectory));
+}
+
+/// What only the world knows: how much of its floor is seen, what of the map is wrong, how far the
+/// trajectory is off.
+std::string truth_text(const ExplorationResult& result) {
+  std::vector<std::string> parts;
+  if (result.against) {
+    const MapTruth& truth = *result.against;
+    parts.push_back(truth.floor > 0.0
+                        ? fmt::format("{:.1f} m² ({:.1f} %) of the {:.1f} m² that hang together "
+                                      "with the start",
+                                      truth.seen, 100.0 * truth.seen / truth.floor, truth.floor)
+                        : "the start is not on free floor");
+    if (truth.reachable_seen)
+      parts.back() +=
+          fmt::format(", {:.1f} % of what the body can cover", 100.0 * *truth.reachable_seen);
+    parts.push_back(fmt::format("wrong: {:.2f} m² free, {:.2f} m² occupied", truth.free_wrong,
+                                truth.occupied_wrong));
+  }
+  if (const auto error = error_of(result))
+    parts.push_back(fmt::format("error {:.3f} m, {:.2f}° (ATE, aligned)", error->ate_translation,
+                                error->ate_rotation));
+  return fmt::format("{}", fmt::join(parts, "; "));
 }
 
 json::object decisions_json(const ExplorationResult& result) {
@@ -140,28 +164,11 @@ std::string summary_text(const ExploreOutcome& outcome) {
       {"drive", fmt::format("{:.1f} m in {}, {}, {}", last.distance, plural(last.step, "motion"),
                             plural(std::ssize(result.decision_seconds), "decision"),
                             plural(result.collisions, "collision"))});
-  std::string map = fmt::format("{:.1f} m² known", result.map.coverage());
-  if (result.against) {
-    const MapTruth& truth = *result.against;
-    map += truth.floor > 0.0
-               ? fmt::format(
-                     ", {:.1f} m² ({:.1f} %) of the {:.1f} m² that hang together with the "
-                     "start",
-                     truth.seen, 100.0 * truth.seen / truth.floor, truth.floor)
-               : ", the start is not on free floor";
-    if (truth.reachable_seen)
-      map += fmt::format(", {:.1f} % of what the body can cover", 100.0 * *truth.reachable_seen);
-    map += fmt::format("; wrong: {:.2f} m² free, {:.2f} m² occupied", truth.free_wrong,
-                       truth.occupied_wrong);
-  }
-  table.add({"map", map});
-  std::string poses = fmt::format("{} of {} kept, {}", result.graph.variable_count(),
+  table.add({"map", fmt::format("{:.1f} m² known", result.map.coverage())});
+  table.add({"graph", fmt::format("{} of {} kept, {}", result.graph.variable_count(),
                                   plural(result.trajectory.variable_count(), "pose"),
-                                  plural(result.slam.loops, "loop closure"));
-  if (const auto error = error_of(result))
-    poses +=
-        fmt::format("; error {:.3f} m, {:.2f}° (ATE)", error->ate_translation, error->ate_rotation);
-  table.add({"graph", poses});
+                                  plural(result.slam.loops, "loop closure"))});
+  if (const std::string truth = truth_text(result); !truth.empty()) table.add({"truth", truth});
   table.add({"time",
              fmt::format("{} deciding, {} mapping, {} estimating, {} matching scans",
                          seconds_text(result.decide_seconds), seconds_text(result.slam.map_seconds),

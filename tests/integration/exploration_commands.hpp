@@ -25,6 +25,7 @@ class ExplorationCommands : public ::testing::Test {
     need({{"world", "lidar_building"},
           {"mapper", "log_odds"},
           {"explorer", "frontier"},
+          {"explorer", "drrt_star"},
           {"path_planner", "grid_dijkstra"},
           {"floor_plan", "rooms"},
           {"pose_policy", "compact_pose"}});

@@ -292,7 +292,7 @@ void bind_exploration(py::module_& module) {
   bind_step(module);
   bind_result(module);
   module.def(
-      "explore", &explore, py::arg("floor"), py::arg("explorer") = "frontier", py::kw_only(),
+      "explore", &explore, py::arg("floor"), py::arg("explorer") = ExplorationSetup::kExplorer, py::kw_only(),
       py::arg("seed") = 1, py::arg("start") = py::none(), py::arg("max_distance") = py::none(),
       py::arg("max_steps") = py::none(), py::arg("max_decisions") = py::none(),
       py::arg("max_known") = py::none(), py::arg("min_rate") = py::none(),

@@ -43,13 +43,14 @@ CONFIGURATION_SPACE = {"frontier": "frontier:length=0.5,smallest=0.1,keep=1,plan
                        "ede_rrt_star": "ede_rrt_star", "ours: frontier": "frontier", "ours: dopt": "dopt"}
 ACTION_SPACE = {"frontier": "frontier:length=0.9,keep=1,planner=rrt_star",
                 "heuristic": "heuristic:keep=1,planner=rrt_star,entropy=thesis,revisits=0", "ede_rrt_star": "ede_rrt_star",
-                "drrt_star": "drrt_star", "errt_star": "errt_star", "ours: frontier": "frontier", "ours: dopt": "dopt",
+                "drrt_star": "drrt_star:revisits=0", "errt_star": "errt_star:revisits=0", "ours: frontier": "frontier", "ours: dopt": "dopt",
                 "ours: random": "random"}
 # The weight of the map from the pose at the end of each path, the former default (docs/explore.md).
-ALPHA_AT_END = {name: name for name in ["drrt_star:alpha=end", "errt_star:alpha=end"]}
+ALPHA_AT_END = {f"{name}:alpha=end": f"{name}:alpha=end,revisits=0" for name in ["drrt_star", "errt_star"]}
 MOST_RUNS_BEYOND = 10  # of each method that the thesis does not have
 # On other floors the claim that counts is tried: a better map at equal coverage.
-ELSEWHERE = {"frontier": ACTION_SPACE["frontier"], "drrt_star": "drrt_star", "drrt_star:alpha=end": "drrt_star:alpha=end"}
+ELSEWHERE = {"frontier": ACTION_SPACE["frontier"], "drrt_star": ACTION_SPACE["drrt_star"],
+             "drrt_star:alpha=end": ALPHA_AT_END["drrt_star:alpha=end"]}
 OTHER_FLOORS = {"intel_lab": "@corridors", "stata_basement": "@loop"}
 
 

@@ -29,6 +29,7 @@ struct ExplorationSetup {
   static constexpr double kSampleDistance = 5.0;  // [m]
   /// What a run is made of unless something else is named.
   static constexpr const char* kWorld = "lidar_building";
+  static constexpr const char* kExplorer = "drrt_star";
   static constexpr const char* kPolicy = "compact_pose:range=2,angle=3.14,reuse=false,gate=0.9999";
 
   Registry& registry;

@@ -43,7 +43,7 @@ struct PathValueOptions {
               OptionFields<I>()
                   .choice("loops", &I::loops,
                           "covariances after a loop closure: exact, or interpolated as in the "
-                          "thesis (5.16), which promises too much once the graph has loops")
+                          "thesis (5.16), which expects too much once the graph has loops")
                   .real("loop_gain", &I::loop_gain, -1.0, 1e9,
                         "information gain that a loop closure on a path must exceed to be expected "
                         "[nats]; negative: that of the policy")
