@@ -394,9 +394,10 @@ Command add_explore(ArgumentParser program) {
                  "write scans, odometry and true poses as a log of CARMEN, run.clf.gz")
       .type_name("FILE");
   add_recording_options(cli, options->recording);
-  cli.add_option("--explorer", options->explorer,
-                 "decides where to drive; options as NAME:k=v; several, A,B, are compared; frontier "
-                 "finishes small floors sooner")
+  cli.add_option(
+         "--explorer", options->explorer,
+         "decides where to drive; options as NAME:k=v; several, A,B, are compared; frontier "
+         "finishes small floors sooner")
       .components({"explorer"})
       .show_default();
   cli.add_option(
@@ -423,7 +424,8 @@ Command add_explore(ArgumentParser program) {
                  "where the robot starts [m]; default: the widest place")
       .type_name("M");
   cli.add_option("--start-y", options->start_y, "goes with --start-x").type_name("M");
-  cli.add_option("--start-theta", options->start_theta, "its heading there [rad]").type_name("RAD");
+  cli.add_option("--start-theta", options->start_theta, "its heading there [rad]; default: 0")
+      .type_name("RAD");
   cli.add_option("--seed", options->seed, "of all noise and random choices")
       .type_name("N")
       .show_default();

@@ -59,9 +59,7 @@ Decision end_decision(Decision::Kind kind, std::string why) {
 
 bool moves(const Situation& situation, const PlannedPath& path) {
   std::size_t passed = 0;
-  const std::optional<PlannedPath> driven =
-      drivable_path(path, situation.pose, situation.robot, situation.map, situation.interrupt);
-  return driven && next_motion(situation.pose, *driven, situation.robot, passed).has_value();
+  return next_motion(situation.pose, path, situation.robot, passed).has_value();
 }
 
 void EdeGoals::begin() {

@@ -89,9 +89,6 @@ bool EdeRrtStar::drive(const Situation& situation, bool tight, const DecisionTim
     for (const Goal& goal : goals) {
       if (situation.interrupted()) break;
       std::optional<PlannedPath> path = path_to(at, goal.configuration);
-      if (path)
-        path = drivable_path(std::move(*path), situation.pose, situation.robot, situation.map,
-                             situation.interrupt);
       if (!path) continue;
       if (tight) path->radius = narrowed(situation.robot, situation.map.frame).radius;
       if (!moves(situation, *path)) {

@@ -75,8 +75,9 @@ constexpr double kGrowthPart = 0.3, kTreePart = 0.8;
 constexpr double kLeastPart = 0.2;
 /// Paths of a tree that are evaluated exactly at least, the best ones by their estimates.
 constexpr std::size_t kEvaluated = 32;
-/// A path that brings no more than this has only closed loops [m²].
-constexpr double kLittleFloor = 0.5;
+/// Paths that bring no more than this, or no more than this part of what is known, have only closed
+/// loops [m²].
+constexpr double kLittleFloor = 0.5, kLittlePart = 0.01;
 /// Further candidates that a decision lists, and how far their ends are apart [m].
 constexpr std::size_t kListed = 10;
 constexpr double kApart = 1.0;
@@ -130,8 +131,10 @@ class TreeExplorer : public Explorer {
     by_fallback_ = false;
     const FreeSpace space(situation.map, situation.pose.translation(), situation.robot.radius);
     if (space.empty()) return otherwise(situation, "the robot does not fit where it is", {});
-    if (const std::string why = fallback_ ? why_done(situation) : ""; !why.empty())
-      return otherwise(situation, why, {});
+    if (fallback_ && options_.revisits > 0) {
+      const std::string why = why_done(situation);
+      if (!why.empty()) return otherwise(situation, why, {});
+    }
     const std::vector<Vector2d> left_out =
         discovery_.not_found(situation, options_.value.simulated_range);
     PathValue value(situation, options_.value, left_out);
@@ -245,17 +248,20 @@ class TreeExplorer : public Explorer {
     return candidate;
   }
 
+  static bool has_wide_frontier(const Situation& situation) {
+    const std::vector<Frontier>& frontiers = situation.map.frontiers;  // longest first
+    return !frontiers.empty() && frontiers.front().length >= 2.0 * situation.robot.radius;
+  }
+
   /// Why the fallback decides, whatever paths are worth: there is always more to know about a
   /// trajectory, and through the gaps of a ragged wall floor is expected that is none. Else empty.
   std::string why_done(const Situation& situation) {
-    const std::vector<Frontier>& frontiers = situation.map.frontiers;  // longest first
-    if (frontiers.empty() || frontiers.front().length < 2.0 * situation.robot.radius)
-      return "no frontier is as wide as the body";
+    if (!has_wide_frontier(situation)) return "no frontier is as wide as the body";
     const double coverage = situation.map.coverage();
-    if (coverage > covered_ + kLittleFloor) {
+    if (coverage > covered_ + std::max(kLittleFloor, kLittlePart * covered_)) {
       covered_ = coverage;
       revisits_ = 0;
-    } else if (options_.revisits > 0 && ++revisits_ > options_.revisits) {
+    } else if (++revisits_ > options_.revisits) {
       return fmt::format("{} paths in a row brought hardly any floor", options_.revisits);
     }
     return {};
@@ -266,7 +272,8 @@ class TreeExplorer : public Explorer {
     discovery_.expect({}, 2.0);
     const std::vector<Frontier>& frontiers = situation.map.frontiers;
     if (!fallback_) {
-      searched.kind = frontiers.empty() ? Decision::Kind::finished : Decision::Kind::stuck;
+      searched.kind =
+          has_wide_frontier(situation) ? Decision::Kind::stuck : Decision::Kind::finished;
       searched.why = fmt::format("{}; {} frontiers are left", why, frontiers.size());
       if (!frontiers.empty())
         searched.why += fmt::format(", the longest of {:.1f} m", frontiers.front().length);

@@ -66,7 +66,8 @@ def test_a_callback_sees_each_motion_and_may_end_it():
     assert [step.step for step in seen] == [1, 2, 3, 4, 5] or [step.step for step in seen] == [0, 1, 2, 3, 4, 5]
     assert result.end == "interrupted"
     assert_array_equal(result.steps["estimate"][-1], seen[-1].estimate.state)
-    assert_array_equal(result.steps["truth"][0], [0, 3, 0])
+    assert_array_equal(result.steps["truth"][0], [0, 0, 0])
+    assert_array_equal(result.start.state, [0, 3, 0])
     with pytest.raises(ZeroDivisionError):
         cairn.explore(room(), callback=lambda step: 1 / 0)
 
@@ -76,7 +77,7 @@ def test_options_and_names_are_checked_with_advice():
         (dict(explorer="frontiers"), "did you mean 'frontier'"),
         (dict(max_distance=0), "max_distance: expected a number above zero"),
         (dict(max_steps=-3), "max_steps: expected a whole number above zero"),
-        (dict(lenght=2), "length"),
+        (dict(explorer="frontier", lenght=2), "length"),
         (dict(start=Pose2(50, 50, 0)), "50"),
         (dict(world="lidar_building:rnge=3"), "range"),
     ]:
@@ -164,7 +165,7 @@ def test_it_is_begun_with_the_seed_and_asked_after_each_motion():
 
         def decide(self, situation):
             self.decision = situation.decision
-            return cairn.Decision.drive([2.5, 4.5], "to the other corner") if situation.decision < 3 else cairn.Decision.stuck("enough")
+            return cairn.Decision.drive([2.5, 1.5], "to the other corner") if situation.decision < 3 else cairn.Decision.stuck("enough")
 
         def is_worthwhile(self, situation, path):
             self.asked += 1
@@ -184,7 +185,7 @@ def test_what_is_worthwhile_returns_is_a_truth_value(returned, goes_on):
     class Explorer:
         def decide(self, situation):
             self.decision = situation.decision
-            return cairn.Decision.drive([2.5, 4.5]) if situation.decision < 2 else cairn.Decision.stuck("enough")
+            return cairn.Decision.drive([2.5, 1.5]) if situation.decision < 2 else cairn.Decision.stuck("enough")
 
         def is_worthwhile(self, situation, path):
             self.asked = getattr(self, "asked", 0) + 1
@@ -199,7 +200,7 @@ def test_what_is_worthwhile_returns_is_a_truth_value(returned, goes_on):
 def test_what_else_it_returns_is_refused(returned, name):
     class Explorer:
         def decide(self, situation):
-            return cairn.Decision.drive([2.5, 4.5])
+            return cairn.Decision.drive([2.5, 1.5])
 
         def is_worthwhile(self, situation, path):
             return returned
@@ -218,7 +219,7 @@ def test_the_situation_has_the_map_and_how_certain_the_poses_are():
 
     def decide(situation):
         if situation.decision == 0:
-            return cairn.Decision.drive([[1.0, 2.6], [2.4, 2.6]], look_at=[2.4, 4.0])  # below the wall in the middle
+            return cairn.Decision.drive([[1.0, -0.4], [2.4, -0.4]], look_at=[2.4, 1.0])  # below the wall in the middle
         seen.update({name: getattr(situation, name) for name in
                      ["pose", "poses", "free", "occupied", "log_odds", "clearance", "caution", "resolution", "radius", "frontiers"]})
         seen["states"], seen["graph"] = situation.states(Pose2), situation.graph()
@@ -226,8 +227,8 @@ def test_the_situation_has_the_map_and_how_certain_the_poses_are():
         row, column = situation.cells_at(situation.pose.state[:2])
         assert situation.free[row, column]
         assert_array_equal(situation.cells_at(situation.centres([row, column])), [row, column])
-        assert situation.path_to([0.0, 3.0]).points.shape[1] == 2
-        assert situation.path_to([50.0, 3.0]) is None
+        assert situation.path_to([0.0, 0.0]).points.shape[1] == 2
+        assert situation.path_to([50.0, 0.0]) is None
         seen["situation"] = situation
         return cairn.Decision.finished("seen")
 
@@ -235,8 +236,8 @@ def test_the_situation_has_the_map_and_how_certain_the_poses_are():
     assert run.end == "finished" and run.why == "seen"
     assert_array_equal(run.steps["estimate"][-1], seen["pose"].state)
     # It has driven along the path, past its corner, and looks where it shall.
-    assert np.hypot(*(seen["pose"].state[:2] - [2.4, 2.6])) < 0.1 and abs(seen["pose"].theta - np.pi / 2) < 0.1
-    assert np.linalg.norm(run.steps["estimate"][:, :2] - [1.0, 2.6], axis=1).min() < 0.3
+    assert np.hypot(*(seen["pose"].state[:2] - [2.4, -0.4])) < 0.1 and abs(seen["pose"].theta - np.pi / 2) < 0.1
+    assert np.linalg.norm(run.steps["estimate"][:, :2] - [1.0, -0.4], axis=1).min() < 0.3
     cells = run.map.cells  # the same, as the run has left it
     assert cells.shape == seen["free"].shape == seen["log_odds"].shape == seen["clearance"].shape
     assert_array_equal(cells == -1, ~(seen["free"] | seen["occupied"]))
@@ -326,5 +327,5 @@ def test_a_floor_goes_by_its_name(tmp_path):
 
 @pytest.mark.parametrize("name", ["until", "lidar"])
 def test_an_option_that_nothing_has_is_answered_by_the_arguments(name):
-    with pytest.raises(cairn.Error, match=f"explore has no argument '{name}', nor has frontier such an option; arguments: floor, .*max_distance.*world.*options: "):
+    with pytest.raises(cairn.Error, match=f"explore has no argument '{name}', nor has drrt_star such an option; arguments: floor, .*max_distance.*world.*options: "):
         cairn.explore(room(), **{name: "x"})

@@ -95,11 +95,7 @@ class Run {
         contacts_(robot_.radius) {}
 
   ExplorationResult run() {
-    if (std::isfinite(parts_.limits.known) && parts_.reachable.empty())
-      throw Error(
-          ErrorCode::usage,
-          "a run ends by how much of the floor is known only where that floor, and what the "
-          "body can cover of it, is given");
+    check_known();
     begin();
     if (recorded_)
       follow();
@@ -110,6 +106,21 @@ class Run {
   }
 
  private:
+  void check_known() const {
+    const double known = parts_.limits.known;
+    if (!std::isfinite(known)) return;
+    if (known > 1.0)
+      throw Error(
+          ErrorCode::usage,
+          fmt::format("a run ends by the part of the floor that is known: {:g} is more than "
+                      "all of it",
+                      known));
+    if (parts_.reachable.empty() || recorded_)
+      throw Error(ErrorCode::usage,
+                  "a run ends by the part of the floor that is known only where it is known what "
+                  "the body can cover: of a simulated robot, on a floor");
+  }
+
   void explore() {
     while (!ended_) {
       if (!check_limits()) break;
@@ -117,14 +128,29 @@ class Run {
       if (!decision) {
         end_interrupted();
       } else if (decision->kind == Decision::Kind::drive) {
+        backed_out_ = 0;
         drive(decision->candidates.at(decision->chosen).path);
         retracing_ = false;
-      } else if (!doubts_contacts()) {
+      } else if (!doubts_contacts() && !backs_out()) {
         end(decision->kind == Decision::Kind::finished ? ExplorationEnd::finished
                                                        : ExplorationEnd::stuck,
             decision->why);
       }
     }
+  }
+
+  /// A robot that can't turn in place, and knows of no way on, sees more from where it came from.
+  bool backs_out() {
+    constexpr int kMostInARow = 8;
+    const std::vector<Frontier>& frontiers = slam_.map().frontiers;  // longest first
+    if (robot_.motion != MotionModel::dubins || backed_out_ == kMostInARow || frontiers.empty() ||
+        frontiers.front().length < 2.0 * robot_.radius)
+      return false;
+    ++backed_out_;
+    retracing_ = true;
+    drive(way_back());
+    retracing_ = false;
+    return true;
   }
 
   /// A recorded robot goes where it went.
@@ -253,9 +279,9 @@ class Run {
       end(ExplorationEnd::limit, fmt::format("{} motions are made", limits.steps));
     } else if (decisions_ >= limits.decisions) {
       end(ExplorationEnd::limit, fmt::format("{} decisions are made", limits.decisions));
-    } else if (!recorded_) {
+    } else {
       check_discoveries();
-      if (!ended_) check_progress();
+      if (!ended_ && !recorded_) check_progress();
     }
     return !ended_;
   }
@@ -362,23 +388,28 @@ class Run {
     retracing_ = true;
   }
 
-  /// Where the robot has driven it can drive, the other way round. Empty: it is back at its start.
-  PlannedPath way_back() const {
+  /// Where the robot has driven it can drive, the other way round, which it does once; from its
+  /// start it backs by its radius, though the lidar may not look there.
+  PlannedPath way_back() {
     constexpr double kLength = 1.0;  // [m]
-    const std::span<const Pose2> poses = slam_.poses();
-    PlannedPath path{.points = {slam_.pose().translation()}};
+    Pose2 at = slam_.pose();
+    PlannedPath path{.points = {at.translation()}};
     double way = 1.0;
-    for (std::size_t k = trail_.size(); k > 0 && path.length < kLength; --k) {
-      const Pose2 from = poses[trail_[k - 1]];
-      const Pose2 motion = from.between(k < trail_.size() ? poses[trail_[k]] : slam_.pose());
+    while (!trail_.empty() && path.length < kLength) {
+      const Pose2 from = slam_.poses()[trail_.back()];
+      trail_.pop_back();
+      const Pose2 motion = from.between(at);
       const double back = motion.x() < 0.0 ? 1.0 : -1.0;
       if (std::exchange(way, back) != back) path.cusps.push_back(path.points.size() - 1);
       constexpr int kParts = 4;
       for (int part = kParts; part-- > 0;)
         path.points.push_back(from.retract(motion.log() * (double(part) / kParts)).translation());
       path.length += motion.translation().norm();
+      at = from;
     }
-    return path;
+    if (path.length >= robot_.radius) return path;
+    const Eigen::Vector2d behind = slam_.pose() * Point2(-robot_.radius, 0.0);
+    return {.points = {slam_.pose().translation(), behind}, .length = robot_.radius, .cusps = {0}};
   }
 
   Situation situation(const FloorMap& map, std::span<const Id> kept) {
@@ -394,16 +425,6 @@ class Run {
             .first_sigma = parts_.first_sigma,
             .budget = parts_.decision_budget,
             .interrupt = parts_.interrupt};
-  }
-
-  /// The scans from which the robot has driven on; on its way back they are taken off again.
-  void note_trail(double driven) {
-    if (driven < kNoMotion) return;
-    if (!retracing_) {
-      trail_.push_back(slam_.poses().size() - 2);
-    } else if (!trail_.empty()) {
-      trail_.pop_back();
-    }
   }
 
   void drive(const PlannedPath& path) {
@@ -513,7 +534,7 @@ class Run {
     const Pose2 expected = slam_.pose() * step.odometry;
     slam_.add(step.odometry, step.covariance, std::move(step.scan), to);
     watch_matches(driven);
-    note_trail(driven);
+    if (driven > kNoMotion && !retracing_) trail_.push_back(slam_.poses().size() - 2);
     record(driven);
     const double jump = (slam_.pose().translation() - expected.translation()).norm();
     if (jump > slam_.map().frame.resolution) contacts_.forget();  // they were in another frame
@@ -567,8 +588,8 @@ class Run {
     result_.converged = slam_.finish();
     if (not_driven_ > 0) {
       note_once(fmt::format(
-          "{} paths could not be followed with a turning radius of {:g} m: their goals were given "
-          "up",
+          "{} times no curve with a turning radius of {:g} m led to where it was to go: it went "
+          "elsewhere, or back the way it came",
           not_driven_, robot_.turning_radius));
     }
     for (const std::string& note : slam_.counts().notes) note_once(note);
@@ -643,10 +664,11 @@ class Run {
   ExplorationResult result_;
   Eigen::Vector2d first_truth_ = Eigen::Vector2d::Zero();  // position [m], with `result_.start`
   bool ended_ = false, backing_off_ = false;
-  double next_doubt_ = 0.0;  // of contacts, so as to go on, no earlier [m driven]
-  int not_driven_ = 0;       // paths
-  bool retracing_ = false;   // what it has driven: `trail_`, of scans
-  std::vector<std::size_t> trail_;
+  double next_doubt_ = 0.0;         // of contacts, so as to go on, no earlier [m driven]
+  int not_driven_ = 0;              // paths
+  int backed_out_ = 0;              // times in a row
+  bool retracing_ = false;          // on its way back
+  std::vector<std::size_t> trail_;  // scans from which it has driven on and not come back
   int decisions_ = 0, empty_decisions_ = 0, refused_paths_ = 0, idle_ = 0, collisions_in_row_ = 0;
   double next_look_ = 0.0;                            // at what is known, no earlier [m driven]
   std::size_t rate_from_ = 0;                         // the step that many metres ago

@@ -169,6 +169,9 @@ TEST(Exploration, EndsOnceEnoughIsKnown) {
   exploration.limits.known = 0.6;
   EXPECT_THROW(run_exploration(exploration), Error);  // of what?
   exploration.reachable = survey.covered;
+  exploration.limits.known = 2.0;
+  EXPECT_THROW(run_exploration(exploration), Error);
+  exploration.limits.known = 0.6;
   const ExplorationResult result = run_exploration(exploration);
   EXPECT_EQ(result.end, ExplorationEnd::limit);
   EXPECT_THAT(result.why, HasSubstr("of what the body can cover is seen"));
