@@ -169,7 +169,7 @@ class OneFactor {
       const double weight = weights_[static_cast<std::size_t>(row)];
       const double scale = weight > 0.0 ? 1.0 / weight : 0.0;
       r[row] *= scale;
-      if (J) J->row(row) *= scale;
+      if (J && columns > 0) J->row(row) *= scale;
     }
     return r;
   }
