@@ -424,7 +424,8 @@ Command add_explore(ArgumentParser program) {
                  "where the robot starts [m]; default: the widest place")
       .type_name("M");
   cli.add_option("--start-y", options->start_y, "goes with --start-x").type_name("M");
-  cli.add_option("--start-theta", options->start_theta, "its heading there [rad]; default: 0")
+  cli.add_option("--start-theta", options->start_theta,
+                 "its heading there [rad]; default: 0; without --start-x by the seed")
       .type_name("RAD");
   cli.add_option("--seed", options->seed, "of all noise and random choices")
       .type_name("N")

@@ -37,6 +37,8 @@ constexpr int kMostWide = 8 * kDriven, kMostNarrow = kDriven;
 constexpr int kMostNarrowFailures = 6;
 /// A robot that has moved by this looks around anew [m].
 constexpr double kElsewhere = 0.5;
+/// A robot that can't turn in place backs so often in a row instead of looking around.
+constexpr int kMostBacks = 8;
 /// Between the cells of a frontier that are tried as goals [m].
 constexpr double kSpacing = 0.5;
 
@@ -49,6 +51,7 @@ void FrontierGoals::begin() {
   narrow_failures_ = 0;
   looked_around_ = 0.0;
   looked_at_.reset();
+  backed_ = 0;
 }
 
 void FrontierGoals::start(const Situation& situation) {
@@ -91,8 +94,15 @@ std::vector<Candidate> FrontierGoals::candidates(double least) {
 
 std::optional<PlannedPath> FrontierGoals::look_around() {
   const RobotModel& robot = situation_->robot;
-  if (unreachable_ == 0 || robot.motion == MotionModel::dubins) return std::nullopt;
+  if (unreachable_ == 0) return std::nullopt;
   const Vector2d here = situation_->pose.translation();
+  if (robot.motion == MotionModel::dubins) {
+    if (backed_ == kMostBacks) return std::nullopt;
+    ++backed_;
+    return PlannedPath{.points = {here, situation_->pose * Point2(-robot.step, 0.0)},
+                       .length = robot.step,
+                       .cusps = {0}};
+  }
   if (!looked_at_ || (here - *looked_at_).norm() > kElsewhere) {
     looked_at_ = here;
     looked_around_ = 0.0;
@@ -156,6 +166,7 @@ bool FrontierGoals::moves(const PlannedPath& path) const {
 }
 
 void FrontierGoals::chosen(const PlannedPath& path) {
+  backed_ = 0;
   const FloorMap& map = situation_->map;
   if (!path.look_at || !is_there(map, *path.look_at)) return;
   attempt_ = Attempt{.goal = KnownSurroundings(map, *path.look_at),

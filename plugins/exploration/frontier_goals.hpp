@@ -40,7 +40,8 @@ class FrontierGoals {
   void chosen(const PlannedPath& path);
 
   /// Where none of the frontiers that the last `candidates` has seen has a path: a turn of one
-  /// motion, until the robot has turned once around. With noise the newest scan alone may close a
+  /// motion, until the robot has turned once around; one that can't turn in place backs, some times
+  /// in a row. With noise the newest scan alone may close a
   /// door near the robot, which it does not see with another heading.
   std::optional<PlannedPath> look_around();
 
@@ -89,6 +90,7 @@ class FrontierGoals {
   double longest_unreachable_ = 0.0;
   double looked_around_ = 0.0;                // at one place [rad]
   std::optional<Eigen::Vector2d> looked_at_;  // that place [m]
+  int backed_ = 0;                            // times in a row
   double narrow_radius_ = 0.0;                // of the body that paths are for [m]; 0: the robot's
 };
 

@@ -128,29 +128,14 @@ class Run {
       if (!decision) {
         end_interrupted();
       } else if (decision->kind == Decision::Kind::drive) {
-        backed_out_ = 0;
         drive(decision->candidates.at(decision->chosen).path);
         retracing_ = false;
-      } else if (!doubts_contacts() && !backs_out()) {
+      } else if (!doubts_contacts()) {
         end(decision->kind == Decision::Kind::finished ? ExplorationEnd::finished
                                                        : ExplorationEnd::stuck,
             decision->why);
       }
     }
-  }
-
-  /// A robot that can't turn in place, and knows of no way on, sees more from where it came from.
-  bool backs_out() {
-    constexpr int kMostInARow = 8;
-    const std::vector<Frontier>& frontiers = slam_.map().frontiers;  // longest first
-    if (robot_.motion != MotionModel::dubins || backed_out_ == kMostInARow || frontiers.empty() ||
-        frontiers.front().length < 2.0 * robot_.radius)
-      return false;
-    ++backed_out_;
-    retracing_ = true;
-    drive(way_back());
-    retracing_ = false;
-    return true;
   }
 
   /// A recorded robot goes where it went.
@@ -245,16 +230,19 @@ class Run {
 
   MapSample map_sample(const Graph& estimate) {
     const FloorMap& map = slam_.map();
-    MapSample sample{.distance = result_.steps.back().distance,
-                     .coverage = map.coverage(),
-                     .error = contradicted_area(map, slam_.scans(), slam_.poses()),
-                     .against = {}};
-    if (parts_.start.floor && result_.start) {
-      if (const std::optional<Pose2> to_floor = alignment(estimate))
-        sample.against =
-            compare_with_floor(map, *parts_.start.floor, *to_floor, first_truth_, parts_.reachable);
-    }
-    return sample;
+    return {.distance = result_.steps.back().distance,
+            .coverage = map.coverage(),
+            .error = contradicted_area(map, slam_.scans(), slam_.poses()),
+            .against = beside_floor(estimate)};
+  }
+
+  /// None: the floor is not known, or not how the map lies on it.
+  std::optional<MapTruth> beside_floor(const Graph& estimate) {
+    if (!parts_.start.floor || !result_.start) return std::nullopt;
+    const std::optional<Pose2> to_floor = alignment(estimate);
+    if (!to_floor) return std::nullopt;
+    return compare_with_floor(slam_.map(), *parts_.start.floor, *to_floor, first_truth_,
+                              parts_.reachable);
   }
 
   // Deciding and driving --------------------------------------------------------------------------
@@ -289,12 +277,11 @@ class Run {
   void check_discoveries() {
     const ExplorationLimits& limits = parts_.limits;
     const ExplorationStep& last = result_.steps.back();
-    constexpr double kBetweenLooks = 2.0;  // [m]
+    constexpr double kBetweenLooks = 0.5;  // [m]
     if (std::isfinite(limits.known) && last.distance >= next_look_) {
       next_look_ = last.distance + kBetweenLooks;
-      const MapSample sample =
-          map_sample(recovered_trajectory(parts_.policy, Recovery::distribute));
-      const double seen = sample.against ? sample.against->reachable_seen.value_or(0.0) : 0.0;
+      const auto against = beside_floor(recovered_trajectory(parts_.policy, Recovery::distribute));
+      const double seen = against ? against->reachable_seen.value_or(0.0) : 0.0;
       if (seen >= limits.known)
         return end(ExplorationEnd::limit,
                    fmt::format("{:.1f} % of what the body can cover is seen", 100.0 * seen));
@@ -666,7 +653,6 @@ class Run {
   bool ended_ = false, backing_off_ = false;
   double next_doubt_ = 0.0;         // of contacts, so as to go on, no earlier [m driven]
   int not_driven_ = 0;              // paths
-  int backed_out_ = 0;              // times in a row
   bool retracing_ = false;          // on its way back
   std::vector<std::size_t> trail_;  // scans from which it has driven on and not come back
   int decisions_ = 0, empty_decisions_ = 0, refused_paths_ = 0, idle_ = 0, collisions_in_row_ = 0;

@@ -143,7 +143,7 @@ TEST(MotionModel, ARobotThatCannotTurnLeavesADeadEnd) {
   for (std::size_t y = 20; y < 30; ++y) rows[y].replace(2, 80, std::string(80, '.'));
   for (std::size_t y = 2; y < 58; ++y) rows[y].replace(2, 36, std::string(36, '.'));
   const OccupancyGrid floor = test::drawn_floor(rows, 0.1);
-  for (const char* explorer : {"frontier", "ede_rrt_star", "drrt_star:density=3"}) {
+  for (const char* explorer : {"frontier", "drrt_star:density=3"}) {
     SCOPED_TRACE(explorer);
     if (!Registry().has(Explorer::kKind, parse_component(explorer).name)) continue;
     test::ExplorationParts parts(exact("dubins"), explorer);

@@ -32,7 +32,7 @@ struct ExplorationLimits {
   int steps = std::numeric_limits<int>::max();                ///< motions
   int decisions = std::numeric_limits<int>::max();
   /// Part of what the body can cover that is seen (`MapTruth::reachable_seen`), looked at every
-  /// 2 m: only where the floor is known (`Exploration::reachable`).
+  /// 0.5 m: only where the floor is known (`Exploration::reachable`).
   double known = std::numeric_limits<double>::infinity();
   /// Floor that the last `kRateDistance` metres brought per metre [m²/m]: less ends the run.
   double rate = 0.0;
