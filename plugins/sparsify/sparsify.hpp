@@ -122,8 +122,8 @@ class Sparsify final : public Sparsifier {
   };
   LocalProblem cropped(const WorkGraph& work, std::vector<int> group) const;
   /// What is known in the whole graph, for `Fit` other than `blanket`: as it was a little before,
-  /// since what leaves hardly changes the covariances of the others, and each factorisation takes as
-  /// long as the graph is large.
+  /// since what leaves hardly changes the covariances of the others, and each factorisation takes
+  /// as long as the graph is large.
   struct WholeGraph {
     WholeGraph(Graph now, LinearSolver& solver)
         : graph(std::move(now)), marginals(graph, solver), regular(marginals.factorize().ok) {}

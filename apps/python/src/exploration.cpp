@@ -292,15 +292,15 @@ void bind_exploration(py::module_& module) {
   bind_step(module);
   bind_result(module);
   module.def(
-      "explore", &explore, py::arg("floor"), py::arg("explorer") = ExplorationSetup::kExplorer, py::kw_only(),
-      py::arg("seed") = 1, py::arg("start") = py::none(), py::arg("max_distance") = py::none(),
-      py::arg("max_steps") = py::none(), py::arg("max_decisions") = py::none(),
-      py::arg("max_known") = py::none(), py::arg("min_rate") = py::none(),
-      py::arg("world") = ExplorationSetup::kWorld, py::arg("policy") = ExplorationSetup::kPolicy,
-      py::arg("registration") = "icp", py::arg("mapper") = "log_odds",
-      py::arg("match_range") = py::none(), py::arg("match_angle") = py::none(),
-      py::arg("decision_budget") = py::none(), py::arg("match_consecutive") = true,
-      py::arg("callback") = py::none(),
+      "explore", &explore, py::arg("floor"), py::arg("explorer") = ExplorationSetup::kExplorer,
+      py::kw_only(), py::arg("seed") = 1, py::arg("start") = py::none(),
+      py::arg("max_distance") = py::none(), py::arg("max_steps") = py::none(),
+      py::arg("max_decisions") = py::none(), py::arg("max_known") = py::none(),
+      py::arg("min_rate") = py::none(), py::arg("world") = ExplorationSetup::kWorld,
+      py::arg("policy") = ExplorationSetup::kPolicy, py::arg("registration") = "icp",
+      py::arg("mapper") = "log_odds", py::arg("match_range") = py::none(),
+      py::arg("match_angle") = py::none(), py::arg("decision_budget") = py::none(),
+      py::arg("match_consecutive") = true, py::arg("callback") = py::none(),
       R"(A simulated robot with a lidar explores a floor, and decides by itself where to drive (docs/explore.md).
 
 floor: a Floor to drive on, the name of a file of one, as of `read_floor`, or "@rooms", a floor plan with its options.

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "arc_length.hpp"
 #include "cairn/exploration/dubins_curve.hpp"
 #include "cairn/exploration/path_planner.hpp"
 
@@ -112,16 +113,13 @@ bool is_followed(const PlannedPath& path, const Pose2& from, const RobotModel& r
   double before = room.clearance(from.translation()), driven = 0.0;
   const double most = kDetour * path.length + kThere;
   while (const std::optional<Pose2> motion = next_motion(at, path, robot, passed)) {
-    const double chord = motion->translation().norm();
-    const double turn = motion->theta();
-    const double length = std::abs(turn) < 1e-9 ? chord : chord * 0.5 * turn / std::sin(0.5 * turn);
-    const double way = motion->x() < 0.0 ? -1.0 : 1.0;  // backwards, or ahead
-    driven += length;
-    if (!(length > 1e-6) || driven > most) return false;
-    const int strides = 1 + static_cast<int>(length / room.stride());
+    const double length = arc_length(*motion);
+    driven += std::abs(length);
+    if (!(std::abs(length) > 1e-6) || driven > most) return false;
+    const int strides = 1 + static_cast<int>(std::abs(length) / room.stride());
     for (int k = 1; k <= strides; ++k) {
       const double part = double(k) / strides;
-      const Pose2 on = at * along_arc(way * turn / length, way * part * length);
+      const Pose2 on = at * along_arc(motion->theta() / length, part * length);
       if (!room.admits(on.translation(), before)) return false;
     }
     at = at * *motion;

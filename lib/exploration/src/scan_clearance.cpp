@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <numbers>
 
+#include "arc_length.hpp"
 #include "cairn/exploration/dubins_curve.hpp"
 
 namespace cairn {
@@ -30,8 +31,7 @@ std::vector<Vector2d> places_along(const Pose2& motion, MotionModel model) {
   for (int k = 0; k <= strides; ++k) {
     const double part = double(k) / std::max(1, strides);
     const bool is_arc = model == MotionModel::dubins && std::abs(turn) > 1e-9;
-    const double way = motion.x() < 0.0 ? -1.0 : 1.0;  // backwards, or ahead
-    const double length = is_arc ? way * 0.5 * chord * turn / std::sin(0.5 * turn) : chord;
+    const double length = arc_length(motion);
     places.push_back(is_arc ? along_arc(turn / length, part * length).translation()
                             : part * motion.translation());
   }

@@ -73,8 +73,8 @@ CAIRN_API std::optional<Pose2> next_motion(const Pose2& at, const PlannedPath& p
 /// Dubins curves, searched on the map near the path (hybrid A*: Dolgov, Thrun, Montemerlo and
 /// Diebel, 2010), with points a few centimetres apart, and at the end a heading with `look_at`
 /// before the lidar. It backs where that is shorter by far, or where nothing else leads on (a car
-/// of Reeds and Shepp). None: there is no such curve, so that the goal has to be given up; or
-/// `interrupt`, if not null, has become true, which ends the search at once.
+/// of Reeds and Shepp). None: there is no such curve; or `interrupt`, if not null, has become true,
+/// which ends the search at once.
 CAIRN_API std::optional<PlannedPath> drivable_path(PlannedPath path, const Pose2& at,
                                                    const RobotModel& robot, const FloorMap& map,
                                                    const std::atomic<bool>* interrupt = nullptr);
