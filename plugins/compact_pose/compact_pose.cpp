@@ -22,8 +22,6 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Covariances are asked for within so many radii.
-constexpr double kAhead = 2.0;
 /// Links that wait: older ones are given up when there are more.
 constexpr std::size_t kMostWaiting = 32;
 /// Refused matches that are remembered, and of how many other poses some have to agree with one of
@@ -64,10 +62,6 @@ Matrix sensor_covariance(const std::vector<double>& numbers, const RigidGroup& g
     throw Error(ErrorCode::usage, "compact_pose: sensor is not a positive definite covariance");
   return S;
 }
-
-constexpr auto kByWorth = [](const auto& a, const auto& b) {
-  return a.worth < b.worth || (a.worth == b.worth && a.pose < b.pose);
-};
 
 }  // namespace
 
@@ -121,34 +115,6 @@ void CompactPose::start(const Variable& pose) {
   landmark_loss_ = options_.landmark_loss >= 0.0 ? options_.landmark_loss : kLoss * n;
 }
 
-void CompactPose::expect(const Graph& recording, std::span<const Arrival> poses) {
-  if (options_.search != Search::recorded) return;
-  recorded_.emplace();
-  for (const Arrival& arrival : poses) {
-    const Id pose = recording.id(arrival.pose());
-    for (const int f : arrival.links) {
-      for (const int v : recording.factor_variables(f)) {
-        if (recording.id(v) != pose) (*recorded_)[pose].push_back(recording.id(v));
-      }
-    }
-  }
-}
-
-/// What `Search::untested` comes to where only these match, without the square of the number of
-/// poses. The pose before is among them: the newest depends on all others by its odometry from
-/// there alone, so that no other has a smaller information gain (Σ_in ⪰ Σ of that odometry).
-std::vector<int> CompactPose::recorded_pairs() const {
-  std::vector<int> poses{graph_.predecessor()};
-  if (const auto others = recorded_->find(graph_.newest_id()); others != recorded_->end()) {
-    for (const Id other : others->second) {
-      if (const int pose = graph_.find(other); pose >= 0) poses.push_back(pose);
-    }
-  }
-  std::ranges::sort(poses);
-  poses.erase(std::unique(poses.begin(), poses.end()), poses.end());
-  return poses;
-}
-
 void CompactPose::load(const Graph& map) {
   if (!graph_.empty() || graph_.size() > 0)
     throw Error(ErrorCode::usage, "load after the first pose, or a second map");
@@ -187,6 +153,7 @@ void CompactPose::add_pose(const Variable& pose, std::span<const Factor> odometr
     std::swap(report_, report);
     const Timed timed(report_.seconds.total);
     odometry_ = to_matrix(motion.covariance, graph_.group().tangent_size());
+    driven_ += graph_.group().place(graph_.group().state(motion.mean)).at.t.norm();
     follow_refused(motion);
     graph_.advance(pose, motion, odometry.front().type);
     if (pose.fixed) graph_.keep(report_.seconds);
@@ -208,158 +175,6 @@ void CompactPose::check_new(const Variable& pose) const {
   if (graph_.find(pose.id) >= 0) refuse(fmt::format("pose {} is there already", id_text(pose.id)));
   if (graph_.landmark(pose.id) || waiting_landmarks_.contains(pose.id))
     refuse(fmt::format("pose {} has the id of a landmark", id_text(pose.id)));
-}
-
-/// Σ̄_y of this pose. What the options do not say is learnt; the first match is expected to be like
-/// odometry.
-void CompactPose::expect_matches() {
-  if (sensor_.size() > 0) {
-    expected_ = sensor_;
-  } else {
-    expected_ = typical_.known() ? typical_.covariance() : odometry_;
-  }
-}
-
-/// After a link everything is to be computed anew, and mostly for one pose only: the best of what
-/// is left, which is then used or tells too little for all others. If it is not so, all that are
-/// left are solved for together.
-Displacement CompactPose::known_displacement(int pose) {
-  if (!graph_.prepared(pose)) {
-    std::vector<int> poses{pose};
-    if (asked_version_ == graph_.version()) {
-      for (const Candidate& other : candidates_) {
-        if (other.gain > loop_gain_) poses.push_back(other.pose);
-      }
-    }
-    asked_version_ = graph_.version();
-    graph_.prepare(poses, report_.seconds);
-  } else {
-    graph_.prepare({&pose, 1}, report_.seconds);
-  }
-  Displacement d = graph_.displacement(pose);
-  graph_.set_covariance(pose, d);
-  return d;
-}
-
-double CompactPose::expected_gain(int pose) {
-  return mutual_information(expected_, known_displacement(pose).covariance);
-}
-
-/// Whether no match was asked for only since what is expected of one is poor: one as good as the
-/// newest odometry would be informative enough.
-bool CompactPose::silenced() {
-  if (sensor_.size() > 0 || answered_ > 0 || candidates_.empty()) return false;
-  const Candidate& best = *std::ranges::max_element(candidates_, {}, &Candidate::gain);
-  return best.gain <= loop_gain_ &&
-         mutual_information(odometry_, known_displacement(best.pose).covariance) > loop_gain_;
-}
-
-/// Where requests are limited, some of them in vain, the gain that is to be expected of one; it
-/// only falls with other links, as the gain does.
-double CompactPose::worth(int pose, double gain) const {
-  return options_.matches > 0 ? gain * record_.probability(pose) : gain;
-}
-
-/// Whether the newest pose was matched with this one already, for where it is searched again.
-bool CompactPose::answered(int pose) const {
-  return std::ranges::any_of(report_.links, [&](const LinkReport& link) {
-    return link.later == report_.id && link.earlier == graph_.id(pose);
-  });
-}
-
-/// Lines 14 and 15 of Algorithm 1.
-void CompactPose::search() {
-  searched_ = true;
-  if (graph_.predecessor() < 0) return;
-  const Timed timed(report_.seconds.search);
-  const bool recorded = options_.search == Search::recorded;
-  const std::vector<int> near = recorded ? recorded_pairs() : graph_.near(radius_);
-  std::vector<int> possible;
-  for (const int pose : near) {
-    if (options_.search == Search::index && !test_->possible(graph_.newest_seen_from(pose)))
-      continue;
-    possible.push_back(pose);
-  }
-  const double solving = report_.seconds.covariances;
-  if (!recorded &&
-      !std::ranges::all_of(possible, [&](int pose) { return graph_.prepared(pose); })) {
-    // Where nothing has changed for more than one pose, those that the next will need as well.
-    if (solved_version_ == graph_.version())
-      graph_.prepare(graph_.near(kAhead * radius_), report_.seconds);
-    solved_version_ = graph_.version();
-  }
-  graph_.prepare(possible, report_.seconds);
-  report_.seconds.search -= report_.seconds.covariances - solving;
-  expect_matches();
-  for (const int pose : possible) {
-    Displacement d = graph_.displacement(pose);
-    graph_.set_covariance(pose, d);
-    const Dimensions dimensions = test_->dimensions(d);
-    const bool tested = options_.search == Search::index || options_.search == Search::all;
-    if (tested && !test_->passes(dimensions)) continue;
-    const double gain = mutual_information(expected_, d.covariance);
-    ++report_.candidates;
-    report_.least_gain = std::min(report_.least_gain, gain);
-    if (pose != graph_.predecessor() && !answered(pose)) {
-      candidates_.push_back({pose, graph_.version(), gain, worth(pose, gain),
-                             static_cast<int>(std::ssize(dimensions_))});
-      dimensions_.push_back(dimensions);
-    }
-  }
-  report_.near = static_cast<int>(std::ssize(near));
-  // One that may leave is matched only where no other can be.
-  const auto lasts = [&](const Candidate& one) { return !graph_.temporary(one.pose); };
-  if (std::ranges::any_of(candidates_, lasts)) std::erase_if(candidates_, std::not_fn(lasts));
-  std::ranges::make_heap(candidates_, kByWorth);
-}
-
-std::optional<MatchProposal> CompactPose::next_match() {
-  if (!open_) throw Error(ErrorCode::usage, "next_match without a pose");
-  const Timed timed(report_.seconds.total);
-  if (!searched_) search();
-  if (options_.matches > 0 && answered_ >= options_.matches) return std::nullopt;
-  if (gives_up()) return std::nullopt;
-  while (!candidates_.empty()) {
-    Candidate& best = candidates_.front();
-    if (!(best.gain > loop_gain_)) {
-      if (options_.matches == 0) break;
-      std::ranges::pop_heap(candidates_, kByWorth);  // one that is worth less may gain more
-      candidates_.pop_back();
-      continue;
-    }
-    if (best.version == graph_.version()) {
-      const Displacement d = known_displacement(best.pose);
-      const auto mean = graph_.group().view(d.mean);
-      proposed_ = best.pose;
-      return MatchProposal{graph_.id(best.pose),
-                           graph_.newest_id(),
-                           best.gain,
-                           {{mean.begin(), mean.end()},
-                            {d.covariance.data(), d.covariance.data() + d.covariance.size()}}};
-    }
-    std::ranges::pop_heap(candidates_, kByWorth);
-    Candidate& again = candidates_.back();
-    again.gain = expected_gain(again.pose);
-    again.worth = worth(again.pose, again.gain);
-    again.version = graph_.version();
-    std::ranges::push_heap(candidates_, kByWorth);
-  }
-  return std::nullopt;
-}
-
-/// Takes a pose off the list; mostly it is the first, since that was proposed.
-std::optional<CompactPose::Candidate> CompactPose::take_candidate(int pose) {
-  auto place = std::ranges::find(candidates_, pose, &Candidate::pose);
-  if (place == candidates_.end()) return std::nullopt;
-  const Candidate candidate = *place;
-  if (place == candidates_.begin()) {
-    std::ranges::pop_heap(candidates_, kByWorth);
-    candidates_.pop_back();
-  } else {
-    candidates_.erase(place);
-    std::ranges::make_heap(candidates_, kByWorth);
-  }
-  return candidate;
 }
 
 LinkReport CompactPose::offer(Id other, std::span<const Factor> measured) {

@@ -158,6 +158,8 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   /// memory for every pose and every loop closure, as the graph itself does then.
   bool watches() const { return options_.strategy == Strategy::apal && options_.keep == 0; }
   void search();
+  bool looks_wide();
+  void search_wide();
   std::vector<int> recorded_pairs() const;
   Displacement known_displacement(int pose);
   std::optional<Candidate> take_candidate(int pose);
@@ -220,6 +222,7 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   /// without a recording.
   std::optional<std::unordered_map<Id, std::vector<Id>>> recorded_;
   double radius_ = 0.0;  ///< no pose farther away can be a candidate [m]
+  double driven_ = 0.0;  ///< since all kept poses were looked at last, by odometry [m]
   Matrix sensor_;        ///< Σ̄_y, if it was given; else that of `typical_`
   double loop_gain_ = 0.0, pose_gain_ = 0.0, prior_gain_ = 0.0;  // [nats]
   double landmark_gain_ = 0.0, landmark_loss_ = 0.0;             // [nats]

@@ -52,6 +52,8 @@ struct CompactPoseOptions {
   RotationTest rotation = RotationTest::magnitude;  ///< what `angle` is of
   Axis view_axis = Axis::z;                         ///< along which the sensor looks
   double probability = 0.1;                         ///< s, of being within, in each dimension
+  /// Whether far poses are candidates too where that deviation alone excludes them, see `search`.
+  bool wide = true;
   double noise_scale = 1.0;     ///< by which the standard deviations of that test are multiplied
   double loop_gain = -1.0;      ///< g_loop [nats]; negative: by the size of a pose
   double pose_gain = -1.0;      ///< g_pose [nats]; negative: likewise

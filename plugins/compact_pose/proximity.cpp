@@ -178,6 +178,27 @@ bool DistanceTest::passes(const Dimensions& d) const {
   return true;
 }
 
+std::optional<double> DistanceTest::relative_probability(const Dimensions& d) const {
+  double product = 1.0;
+  const auto include = [&](double probability, double at_zero) {
+    if (!(probability > range_.probability * at_zero)) return false;
+    product *= probability / at_zero;
+    return true;
+  };
+  for (int r = 0; r < d.translations; ++r) {
+    const double sigma = range_.noise_scale * d.t_sigma[r], v = range_.translation[r];
+    if (!include(probability_within(d.t_mean[r], sigma, v), probability_within(0.0, sigma, v)))
+      return std::nullopt;
+  }
+  const double aligned = range_.test == RotationTest::view ? 1.0 : 0.0;
+  for (int r = 0; r < d.rotations; ++r) {
+    if (!include(rotation_probability(d.r_mean[r], d.r_sigma[r]),
+                 rotation_probability(aligned, d.r_sigma[r])))
+      return std::nullopt;
+  }
+  return product;
+}
+
 SensorRange DistanceTest::least_range(const Dimensions& d) const {
   SensorRange least = range_;
   least.translation = {};

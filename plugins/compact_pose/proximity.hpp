@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 
 #include "cairn/runtime/enum_names.hpp"
 #include "rigid_group.hpp"
@@ -60,6 +61,10 @@ class DistanceTest {
   bool possible(const Pose& displacement) const;
   Dimensions dimensions(const Displacement& displacement) const;
   bool passes(const Dimensions& dimensions) const;
+  /// How probable being within range is, beside a displacement with the same covariance and mean
+  /// zero; nothing if that is s or less in a dimension. Where the deviation is large against the
+  /// range, equation 18 excludes all others, whatever the mean: this does not.
+  std::optional<double> relative_probability(const Dimensions& dimensions) const;
   /// The smallest translation and rotation thresholds with which it would pass.
   SensorRange least_range(const Dimensions& dimensions) const;
 

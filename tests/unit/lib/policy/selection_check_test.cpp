@@ -80,7 +80,7 @@ TEST_F(SelectionChecks, AThresholdBelowEveryStepOfOdometryIsRaised) {
 }
 
 TEST_F(SelectionChecks, ASensorThatReachesNoFurtherThanAStepIsNamed) {
-  const Outcome all = run({{"range", "0.01"}, {"angle", "0.01"}});
+  const Outcome all = run({{"range", "0.01"}, {"angle", "0.01"}, {"wide", "false"}});
   EXPECT_EQ(all.kept, 200U);
   ASSERT_THAT(all.advice, SizeIs(2));
   EXPECT_THAT(all.advice[0].finding, HasSubstr("out of the sensor's range"));

@@ -297,6 +297,43 @@ TEST_P(DistanceTestIn, PassesWhereEveryDimensionIsProbableEnough) {
   EXPECT_LT(passed, 450);
 }
 
+TEST_P(DistanceTestIn, BesideAMeanOfZeroALargeDeviationAloneExcludesNobody) {
+  Draw draw(12);
+  int passed = 0, excluded = 0;
+  for (int trial = 0; trial < 500; ++trial) {
+    const SensorRange range{.translation = {0.2, 0.3, 0.25},
+                            .rotation = draw.uniform(0.3, 2.0),
+                            .probability = draw.uniform(0.02, 0.4),
+                            .test = RotationTest::magnitude};
+    const DistanceTest test(group, range);
+    const double scale = std::exp(draw.uniform(-4.0, 3.0));
+    const auto mean = world.random(draw, 3.0 * std::sqrt(scale), 0.6);
+    const Dimensions d =
+        test.dimensions(displacement(mean, draw.covariance(world.tangent(), scale)));
+    double product = 1.0;
+    bool all = true;
+    const auto include = [&](double off, double sigma, double v) {
+      const double part = integral(off, sigma, v) / integral(0.0, sigma, v);
+      all &= part > range.probability;
+      product *= part;
+    };
+    for (int r = 0; r < d.translations; ++r)
+      include(d.t_mean[r], d.t_sigma[r], range.translation[r]);
+    include(d.r_mean[0], d.r_sigma[0], range.rotation);
+    const std::optional<double> probability = test.relative_probability(d);
+    ASSERT_EQ(probability.has_value(), all);
+    if (!all) {
+      EXPECT_FALSE(test.passes(d));
+      continue;
+    }
+    EXPECT_NEAR(*probability, product, 1e-9);
+    ++passed;
+    excluded += !test.passes(d);
+  }
+  EXPECT_GT(passed, 50);
+  EXPECT_GT(excluded, 20);
+}
+
 TEST_P(DistanceTestIn, ViewPassesWhereTheCosineIsProbablyLargeEnough) {
   if (GetParam() == 2) GTEST_SKIP() << "plane";
   Draw draw(8);
