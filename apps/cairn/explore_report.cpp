@@ -43,6 +43,7 @@ std::string truth_text(const ExplorationResult& result) {
   if (const auto error = error_of(result))
     parts.push_back(fmt::format("error {:.3f} m, {:.2f}° (ATE, aligned)", error->ate_translation,
                                 error->ate_rotation));
+  parts.push_back(fmt::format("{:.3f} m expected by the covariances", result.expected_ate));
   return fmt::format("{}", fmt::join(parts, "; "));
 }
 

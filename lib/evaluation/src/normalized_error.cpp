@@ -139,4 +139,12 @@ double expected_ate(Estimator& estimator, const Graph& graph, std::span<const Id
   return std::sqrt(std::max(0.0, aligned) / static_cast<double>(n));
 }
 
+std::vector<Id> evenly_spread(std::span<const Id> ids) {
+  constexpr std::size_t kMost = 40;
+  std::vector<Id> some;
+  const std::size_t count = std::min(kMost, ids.size());
+  for (std::size_t k = 1; k <= count; ++k) some.push_back(ids[k * ids.size() / count - 1]);
+  return some;
+}
+
 }  // namespace cairn

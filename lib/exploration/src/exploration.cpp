@@ -12,6 +12,7 @@
 
 #include <fmt/core.h>
 
+#include "cairn/evaluation/normalized_error.hpp"
 #include "cairn/evaluation/trajectory.hpp"
 #include "cairn/exploration/contacts.hpp"
 #include "cairn/exploration/discovered_floor.hpp"
@@ -23,6 +24,7 @@
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/timed.hpp"
+#include "end_notes.hpp"
 
 namespace cairn {
 namespace {
@@ -573,15 +575,6 @@ class Run {
 
   void finish() {
     result_.converged = slam_.finish();
-    if (not_driven_ > 0) {
-      note_once(fmt::format(
-          "{} times no curve with a turning radius of {:g} m led to where it was to go: it went "
-          "elsewhere, or back the way it came",
-          not_driven_, robot_.turning_radius));
-    }
-    for (const std::string& note : slam_.counts().notes) note_once(note);
-    note_odometry_alone();
-    note_refused_matches();
     result_.map = slam_.map();
     result_.slam = slam_.counts();
     result_.graph = parts_.policy.estimator().graph();
@@ -590,45 +583,16 @@ class Run {
     result_.samples.push_back(map_sample(result_.trajectory));
     result_.map_error = result_.samples.back().error;
     result_.against = result_.samples.back().against;
-    note_unfinished();
-  }
-
-  /// What an explorer takes for all that can be reached may be less, as a simulation knows.
-  void note_unfinished() {
-    constexpr double kNearlyAll = 0.95;
-    if (result_.end != ExplorationEnd::finished || recorded_ || !result_.against) return;
-    const double seen = result_.against->reachable_seen.value_or(1.0);
-    if (seen < kNearlyAll)
-      note_once(
-          fmt::format("nothing was left that it could reach, but it has seen {:.0f} % of what "
-                      "its body could cover",
-                      100.0 * seen));
-  }
-
-  /// Where no scan is matched the map bends as odometry drifts, and nothing else shows that.
-  void note_odometry_alone() {
-    constexpr double kFar = 20.0;  // [m]
-    if (longest_unmatched_ < kFar) return;
-    note_once(fmt::format(
-        "it drove {:.0f} m by odometry alone, without a scan that was matched "
-        "with another one: there the map may be bent{}",
-        longest_unmatched_, parts_.match_consecutive ? "" : "; scans in a row are not matched"));
-  }
-
-  /// Where the registration refuses nearly all pairs, and has matched few scans, the map rests on
-  /// odometry.
-  void note_refused_matches() {
-    constexpr int kEnoughToTell = 50;
-    constexpr double kFew = 0.15, kFewOfScans = 0.1;
-    const ScanSlamCounts& counts = slam_.counts();
-    if (counts.proposed < kEnoughToTell || counts.registered >= kFew * counts.proposed ||
-        counts.registered + counts.consecutive >=
-            kFewOfScans * static_cast<double>(result_.steps.size()))
-      return;
-    note_once(fmt::format(
-        "of {} pairs of scans that were to be matched, the registration has refused {}: the map "
-        "rests mostly on odometry; its options say how noisy scans may be and how far apart",
-        counts.proposed, counts.proposed - counts.registered));
+    Estimator& estimator = parts_.policy.estimator();
+    std::vector<Id> kept = parts_.policy.kept();
+    std::ranges::sort(kept);
+    result_.expected_ate = expected_ate(estimator, estimator.graph(), evenly_spread(kept));
+    const RunFacts facts{.not_driven = not_driven_,
+                         .turning_radius = robot_.turning_radius,
+                         .longest_unmatched = longest_unmatched_,
+                         .match_consecutive = parts_.match_consecutive,
+                         .recorded = recorded_ != nullptr};
+    for (const std::string& note : notes_of_end(result_, facts)) note_once(note);
   }
 
   /// From the world of the estimate to that of the floor; none: the true poses do not determine it.

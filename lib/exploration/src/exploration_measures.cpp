@@ -30,6 +30,7 @@ std::span<const ExplorationMeasure> exploration_measures() {
        {"collisions", "", "collisions", &M::collisions},
        {"ate", "m", "absolute trajectory error", &M::ate},
        {"ate_rotation", "deg", "its rotation", &M::ate_rotation},
+       {"expected_ate", "m", "the error that the covariances predict", &M::expected_ate},
        {"seconds", "s", "of the run, without mapping and simulation", &M::seconds, true},
        {"map_seconds", "s", "of mapping", &M::map_seconds, true},
        {"decide_seconds", "s", "of all decisions", &M::decide_seconds, true},
@@ -79,6 +80,7 @@ ExplorationMeasures measures_of(const ExplorationResult& result, double floor_ar
     m.ate = error.ate_translation;
     m.ate_rotation = error.ate_rotation;
   }
+  m.expected_ate = result.expected_ate;
   m.map_seconds = result.slam.map_seconds;
   m.decide_seconds = result.decide_seconds;
   m.seconds = result.decide_seconds + result.slam.policy_seconds + result.slam.registration_seconds;

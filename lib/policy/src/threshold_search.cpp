@@ -19,21 +19,11 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// So many poses, spread evenly, stand for all in `expected_ate`.
-constexpr int kSpread = 40;
 /// Trials in one direction.
 constexpr int kMostTrials = 10;
 const double kStep = std::sqrt(2.0);
 /// Measurements that agree with one another better than that were computed from a result.
 constexpr double kLeastNoiseScale = 1e-3;
-
-/// Ids spread evenly over a trajectory, from a list that rises.
-std::vector<Id> spread(const std::vector<Id>& ids) {
-  std::vector<Id> some;
-  const auto count = std::min<std::size_t>(kSpread, ids.size());
-  for (std::size_t k = 1; k <= count; ++k) some.push_back(ids[k * ids.size() / count - 1]);
-  return some;
-}
 
 std::vector<Id> kept_poses(const PosePolicy& policy) {
   std::vector<Id> ids = policy.kept();
@@ -194,7 +184,7 @@ FoundThresholds find_thresholds(const PolicyJob& job, std::size_t count, double 
     Sample sample{job, setting, count, {}};
     const Graph all = watch.policy().estimator().graph();
     sample.everything.trajectory = trajectory(all);
-    sample.everything.poses = spread(kept_poses(watch.policy()));
+    sample.everything.poses = evenly_spread(kept_poses(watch.policy()));
     const double noise = noise_scale(all, watch.policy().estimator().chi2());
     sample.everything.noise = noise;
     sample.everything.expected = noise * expected_error(watch.policy(), sample.everything.poses);

@@ -2,6 +2,7 @@
 #include "cairn/evaluation/normalized_error.hpp"
 
 #include <cmath>
+#include <numeric>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -186,6 +187,18 @@ TEST(NormalizedError, IsForPosesAndWhatTheySee) {
     }
   }
   EXPECT_EQ(normalized_error(Graph(), Graph()).dof, 0);
+}
+
+TEST(EvenlySpread, AllOfFewAndFortyOfMany) {
+  std::vector<Id> ids(40);
+  std::iota(ids.begin(), ids.end(), Id{100});
+  EXPECT_EQ(evenly_spread(ids), ids);
+  ids.resize(4000);
+  std::iota(ids.begin(), ids.end(), Id{0});
+  const std::vector<Id> some = evenly_spread(ids);
+  ASSERT_EQ(some.size(), 40U);
+  for (std::size_t k = 0; k < some.size(); ++k) EXPECT_EQ(some[k], 100 * static_cast<Id>(k) + 99);
+  EXPECT_TRUE(evenly_spread({}).empty());
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "cairn/evaluation/trajectory.hpp"
 #include "cairn/exploration/exploration.hpp"
 #include "cairn/grid/floor_plan.hpp"
 #include "cairn/grid/floor_survey.hpp"
@@ -257,6 +258,32 @@ TEST(Exploration, SaysHowFarItDroveByOdometryAlone) {
     EXPECT_THAT(result.notes,
                 testing::Contains(HasSubstr("25 m by odometry alone")).Times(matched ? 0 : 1));
   }
+}
+
+/// Twelve runs by odometry alone: their errors are as large as the covariances say, and a note says
+/// so where that is much.
+TEST(Exploration, PredictsTheErrorOfItsTrajectory) {
+  const OccupancyGrid floor = floor_named("rooms:width=12,height=9", 5);
+  double errors = 0.0, predicted = 0.0;
+  int noted = 0, large = 0;
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    ExplorationParts parts("lidar_building:relative=0.1,sigma_xy=0.02,sigma_theta=0.02");
+    parts.registration = std::make_unique<NoRegistration>();
+    Exploration exploration = parts.on(floor, seed);
+    exploration.limits.distance = 15.0;
+    const ExplorationResult result = run_exploration(exploration);
+    const double ate =
+        compare(trajectory(result.trajectory), trajectory(result.truth_trajectory)).ate_translation;
+    errors += ate * ate;
+    predicted += result.expected_ate * result.expected_ate;
+    large += result.expected_ate > 0.2;
+    for (const std::string& note : result.notes)
+      noted += note.find("positions are uncertain") != std::string::npos;
+  }
+  EXPECT_GT(errors, 0.5 * predicted);
+  EXPECT_LT(errors, 2.0 * predicted);
+  EXPECT_EQ(noted, large);
+  EXPECT_GT(large, 0);
 }
 
 TEST(Exploration, AnInterruptEndsItWithItsResults) {

@@ -31,4 +31,8 @@ CAIRN_API NormalizedError normalized_error(const Graph& estimate, const Graph& t
 /// variables without `Placement`.
 CAIRN_API double expected_ate(Estimator& estimator, const Graph& graph, std::span<const Id> poses);
 
+/// At most 40 of these ids, spread evenly over them and the last among them: enough for
+/// `expected_ate` of a whole trajectory.
+CAIRN_API std::vector<Id> evenly_spread(std::span<const Id> ids);
+
 }  // namespace cairn

@@ -27,6 +27,7 @@ struct ExplorationMeasures {
   double collisions = 0.0;
   double ate = 0.0;           ///< absolute trajectory error, after rigid alignment [m]
   double ate_rotation = 0.0;  ///< [deg]
+  double expected_ate = 0.0;  ///< by the covariances [m]
   /// Of deciding, estimating and matching scans, all but mapping and the simulation [s].
   double seconds = 0.0;
   double map_seconds = 0.0;      ///< of mapping: the thesis's "rendering" [s]
