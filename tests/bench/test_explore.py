@@ -5,6 +5,7 @@ import unittest
 
 from bench.intervals import MeanInterval, mean_interval, median_interval, paired_difference, student_t_quantile, value_at
 from bench.published import said
+from bench.studies.explore import cover
 from reports_of import report, section
 
 
@@ -91,30 +92,37 @@ class ThesisTest(unittest.TestCase):
         self.assertIn("On `fr079`; world `lidar_building:fov=180`", table)
 
     def test_differences_are_paired_by_seed(self):
-        # Seeds differ by much, the methods by 10 and 12.
-        table = section(report("explore_scale", entry("scale", "frontier", {"map_entropy": 500.0}, {"map_entropy": 700.0}),
-                               entry("scale", "drrt_star", {"map_entropy": 490.0, "error": 0.05},
-                                     {"map_entropy": 688.0, "error": 0.05})), "explore-scale-differences")
-        self.assertIn("| map entropy [nats·m²] | -11 ± 13 |", table)
+        # Seeds differ by much, the methods by 10 and 12, or by 0.5 in both.
+        table = section(report("explore_scale", entry("scale", "frontier", {"map_entropy": 500.0}, {"map_entropy": 700.0, "loops": 40.0}),
+                               entry("scale", "drrt_star", {"map_entropy": 490.0, "error": 0.05, "loops": 20.5},
+                                     {"map_entropy": 688.0, "error": 0.05, "loops": 40.5})), "explore-scale")
+        self.assertIn("| map entropy [nats·m²] | 600 ± 1271 (527.92) | 589 ± 1258 (526.58) |", table)
+        self.assertIn("| loop closures | 30 ± 127 (22.6) | 30 ± 127 * (18.8) |", table)
         # 0.1 and 0.05 of 700 m²: the same in both seeds.
-        self.assertIn("| map error at equal coverage [m²] | -35.00 ± 0.00 * |", table)
-        self.assertIn("| wrong cells, as much floor seen [m²] | -35.00 ± 0.00 * |", table)
+        self.assertIn("| map error at equal coverage [m²], less frontier's |  | -35.00 ± 0.00 * |", table)
+        self.assertIn("| wrong cells, as much floor seen [m²], less frontier's |  | -35.00 ± 0.00 * |", table)
 
     def test_on_other_floors_differences_are_from_the_first_method_of_the_same_floor(self):
-        other = {**entry("elsewhere", "drrt_star", {"error": 0.05}, {"error": 0.05}), "name": "depot"}
-        table = section(report("explore_elsewhere", entry("elsewhere", "frontier", {"loops": 20.0}, {"loops": 24.0}),
-                               entry("elsewhere", "drrt_star", {"loops": 21.0, "error": 0.05}, {"loops": 25.0, "error": 0.05}),
-                               other), "explore-elsewhere")
-        self.assertIn("| fr079 | map entropy [nats·m²] |", table)
-        self.assertIn("|  | loop closures | 22 ± 25 | 23 ± 25 | +1.000 ± 0.000 * |", table)
-        self.assertIn("|  | map error at equal coverage [m²] | - | - | -35.00 ± 0.00 * |", table)
-        self.assertIn("| depot | map entropy [nats·m²] | - | 500.0 ± 0.0 | - |", table)
+        def elsewhere(floor, method, loops, error):
+            return {**entry("elsewhere", method, *({"loops": value, "error": error} for value in loops)), "name": floor}
+        runs = report("explore_elsewhere", elsewhere("fr079", "frontier", [20.0, 24.0], 0.1),
+                      elsewhere("fr079", "drrt_star", [21.0, 25.0], 0.05), elsewhere("depot", "frontier", [30.0, 30.0], 0.1),
+                      elsewhere("depot", "drrt_star", [30.0, 30.0], 0.2))
+        table = section(runs, "explore-elsewhere")
+        self.assertIn("| fr079 | loop closures | 22 ± 25 | 23 ± 25 * |", table)
+        self.assertIn("|  | map error at equal coverage [m²], less frontier's |  | -35.00 ± 0.00 * |", table)
+        self.assertIn("| depot | loop closures | 30.00 ± 0.00 | 30.00 ± 0.00 |", table)
+        self.assertIn("|  | map error at equal coverage [m²], less frontier's |  | +70.00 ± 0.00 * |", table)
+        claims = section(runs, "explore-elsewhere-claims")
+        self.assertIn("| claim | fr079 | depot |", claims)
+        self.assertIn("has fewer wrong cells than frontier at equal parts seen | seen, clear of zero | not seen |", claims)
 
     def test_a_run_that_failed_has_no_measures_and_no_pair(self):
         table = section(report("explore_cave", entry("cave", "frontier", {"loops": 20.0}, {"loops": 24.0}),
-                               entry("cave", "ede_gradient", {"loops": 21.0}, {"loops": 99.0, "end": "interrupted"})),
-                        "explore-cave-differences")
-        self.assertIn("| loop closures | +1.000 |", table)
+                               entry("cave", "ede_gradient", {"loops": 21.0, "error": 0.2}, {"loops": 99.0, "end": "interrupted"})),
+                        "explore-cave")
+        self.assertIn("| loop closures | 22 ± 25 (15.4) | 21.00 (22) |", table)
+        self.assertIn("| map error at equal coverage [m²], less frontier's |  | +70.00 |", table)
 
     def test_claims_are_seen_not_seen_or_not_measured(self):
         table = section(report(
@@ -138,14 +146,6 @@ class ThesisTest(unittest.TestCase):
 
 
 class FloorsTest(unittest.TestCase):
-    def test_how_each_run_ended(self):
-        late = {"part": "floors", "name": "depot", "method": "dopt", "error": "took too long"}
-        floors = report("explore_floors", entry("floors", "frontier", {}, {"coverage": 300.0}), late)
-        table = section(floors, "explore-floors")
-        self.assertIn("| fr079 | frontier | 1 | limit | 250 m are driven | 250 |", table)
-        self.assertIn("|  | frontier | 2 | limit |", table)
-        self.assertIn("| depot | dopt |  | took too long |", table)
-
     def test_what_is_seen_without_noise(self):
         late = {"part": "exact", "name": "depot", "method": "frontier", "error": "took too long"}
         table = section(report("explore_exact", entry("exact", "frontier", {"reachable_seen": 0.995}), late), "explore-exact")
@@ -153,26 +153,37 @@ class FloorsTest(unittest.TestCase):
         self.assertIn("| 99.5 % |", table)
         self.assertIn("| depot | took too long |", table)
 
-    def test_means_of_each_explorer_on_each_floor(self):
-        runs = [{"seen": seen, "wrong": 1.0} for seen in (20.0, 24.0)]
-        floors = report("explore_floors", entry("floors", "frontier", *runs),
-                        entry("floors", "dopt", *runs, runs[0]))
-        table = section(floors, "explore-floors-means")
-        self.assertIn("| mean ± 95 % | floor | frontier | dopt |", table)
-        self.assertIn("| of the floor seen [m²] | fr079 | 22 ± 25 | 21.3 ± 5.7 |", table)
-        self.assertIn("| wrong cells [m²] | fr079 | 1.000 ± 0.000 | 1.000 ± 0.000 |", table)
-        # Lines of their own have the first two.
-        self.assertEqual(section(floors, "explore-floors").count("| limit |"), 4)
-
-    def test_means_on_six_floors_have_the_graph_and_the_time_as_well(self):
-        table = section(report("explore_six", entry("six", "frontier", {"loops": 20.0, "seconds": 1.0}, {"loops": 24.0, "seconds": 3.0})),
-                        "explore-six")
-        self.assertIn("| loop closures | fr079 | 22 ± 25 |", table)
-        self.assertIn("| time of a run [s] | fr079 | 2 ± 13 |", table)
-
     def test_what_was_changed_has_a_row_for_each_method(self):
         changed = {**entry("sensitivity", "drrt_star", {"loops": 20.0}, {"loops": 24.0}), "change": "range 4 m"}
         missing = {"part": "sensitivity", "method": "frontier", "change": "range 4 m", "missing": True}
         table = section(report("explore_sensitivity", changed, missing), "explore-sensitivity")
         self.assertIn("| range 4 m | drrt_star | 500.0 ± 0.0 | -6.000 ± 0.000 | 22 ± 25 |", table)
         self.assertIn("| range 4 m | frontier | not in this build | not in this build |", table)
+
+
+class CoverTest(unittest.TestCase):
+    def test_ends_errors_and_what_is_seen_are_counted_by_floor(self):
+        def cover(floor, motion, *figures):
+            runs = entry("default", "default", *({"reachable_seen": seen, "ate": ate, "end": end} for seen, ate, end in figures))
+            return {**runs, "floor": floor, "view": "17°", "motion": motion}
+        noted = cover("depot", "holonomic", (0.5, 0.7, "limit"), (0.7, 0.9, "limit"))
+        noted["report"]["runs"][1]["notes"] = ["the positions are uncertain"]
+        table = section(report("explore_default", cover("depot", "differential", (1.0, 0.1, "finished"), (0.9, 0.2, "finished")),
+                               noted, {"part": "default", "floor": "fr079", "motion": "dubins", "error": "took too long"}),
+                        "explore-default")
+        self.assertIn("| depot | 4 | 95 % (90 %) | 60 % (50 %) | - | 2 | 1 | 2 | 0 | 0 | 0 | 0.450 | 0.900 | 2 | 1 |", table)
+        self.assertIn("| fr079 | 0 | - | - | - | 0 | 0 | 0 | 0 | 2 |", table)
+        self.assertIn("| all | 4 | 95 % (90 %) | 60 % (50 %) | - | 2 | 1 | 2 | 0 | 2 |", table)
+
+    def test_a_third_of_the_settings_is_drawn_for_each_explorer(self):
+        for explorer in ["frontier", "errt_star"]:
+            third = cover.third_of(explorer)
+            self.assertEqual(len(set(third)), 50)
+            self.assertEqual(third, cover.third_of(explorer))
+        self.assertNotEqual(cover.third_of("frontier"), cover.third_of("errt_star"))
+        self.assertEqual(len(cover.SETTINGS), 10 * 5 * 3)
+
+    def test_each_run_in_the_warehouse_has_a_row(self):
+        table = section(report("explore_warehouse", entry("warehouse", "default", {
+            "reachable_seen": 0.991, "ate": 0.12, "expected_ate": 0.1, "wrong": 5.0})), "explore-warehouse")
+        self.assertIn("| 1 | limit | 99.1 % | 250 | 0.120 | 0.100 | 5.00 | 20 | 0 |", table)

@@ -31,14 +31,14 @@ def measure_errors(bench: Bench, thresholds: Thresholds, strategy: str) -> Json:
 def measure_comparison(bench: Bench, plain_data: DataSet) -> Json:
     """At every step beside the system with everything."""
     data = with_truth(bench, plain_data)
-    thresholds = find_thresholds(bench, data, "refined")
+    thresholds = find_thresholds(bench, data, "found")
     report = run_compact(bench, data, ["--thresholds", thresholds.file, "--compare", str(bench.cairn.work / "compare.csv")]).report
     return {"part": "compare", "name": data.name, "compare": report["compare"], "run": summary(report)}
 
 
 def study_consistency(bench: Bench, keep: Keep) -> None:
     tell("compact, consistency: normalised errors")
-    thresholds = find_thresholds(bench, ellipse3d(",seed=1000"), "refined")
+    thresholds = find_thresholds(bench, ellipse3d(",seed=1000"), "found")
     for strategy in ["fpfl", "apal"]:
         keep(measure_errors(bench, thresholds, strategy))
     for_each_set("compact, covariances", compact_sets_named(["ellipse3d", "parking-garage"], bench.data, bench.quick),
@@ -48,7 +48,7 @@ def study_consistency(bench: Bench, keep: Keep) -> None:
 def measure_matches(bench: Bench, plain_data: DataSet, sensor: str) -> Json:
     data = with_truth(bench, plain_data)
     registration = f"simulated:{sensor}"
-    thresholds = find_thresholds(bench, data, "refined", ["--registration", registration])
+    thresholds = find_thresholds(bench, data, "found", ["--registration", registration])
     cases = []
     for false_rate, rate_name in [(0.0, "clean"), (FALSE_RATE, "false")]:
         for gate_name, gate in {"open": list[str](), "gated": ["--gate", plain(GATE)]}.items():

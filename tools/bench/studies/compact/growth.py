@@ -15,10 +15,12 @@ from ...reports import NONE, Json, contestant, items, median_of, member, number,
 from ...rounds import Contestant, entries_of, run_rounds
 from ...study import Bench, Keep, Study, tell
 from ...words import count, digits, milliseconds, total, whole
-from .runs import TITLES, contestants_with, find_three_thresholds, named_once, run_compact, summary
+from .runs import TITLES, contestants_with, find_both_thresholds, named_once, run_compact, summary
 
 # A strategy that takes longer is not tried on more laps.
 LIMIT, ENOUGH = 120.0, 10.0  # [s]
+# With which the map of a place stops growing.
+RELOCATING = ["--policy", "compact_pose:reuse=true"]
 LAPS, LAPS_QUICK = [1, 2, 3, 5, 8, 10, 12, 15, 20, 25, 30], [1, 2, 3]
 
 
@@ -64,9 +66,9 @@ def measure_laps(bench: Bench, one: Contestant) -> Json:
 
 
 def study_growth(bench: Bench, keep: Keep) -> None:
-    thresholds = find_three_thresholds(bench, lap_set(3 if bench.quick else 10))
-    keep({"part": "thresholds", **{of: thresholds[of].found for of in ["refined", "by_rule"]}})
-    contestants = [one for one in contestants_with(thresholds, LIMIT, ENOUGH) if one.name != "plain"]
+    thresholds = find_both_thresholds(bench, lap_set(3 if bench.quick else 10), RELOCATING)
+    keep({"part": "thresholds", **{of: one.found for of, one in thresholds.items()}})
+    contestants = contestants_with(thresholds, LIMIT, ENOUGH, RELOCATING)
     measure_growth(bench, contestants, keep)
     for one in contestants:
         if one.name != "tested":

@@ -17,8 +17,7 @@ from ...rounds import Contestant
 from ...study import Bench
 from ...words import percent, times
 
-AS_PUBLISHED = "compact_pose:reuse=false"  # Algorithm 1 of the paper, without relocation, as by default
-RELOCATING = "compact_pose:reuse=true"
+AS_PUBLISHED = "compact_pose:wide=false"  # Algorithm 1 of the paper, with candidates by equation 18 alone
 # Policy of APAL: no pair of poses is tested for being near (s = 0), so that every loop closure of a recording is found.
 ALL_LOOPS = "compact_pose:search=recorded"
 
@@ -84,20 +83,18 @@ def find_thresholds(bench: Bench, data: DataSet, name: str, more: Words | None =
 BY_RULE = ["--error-ratio", "0", "--policy", AS_PUBLISHED]  # of section 5.2 alone
 
 
-def find_three_thresholds(bench: Bench, data: DataSet) -> dict[str, Thresholds]:
-    """With relocation; without it, as by default; and as published: without relocation, and by the rule of section 5.2 alone."""
-    return {"refined": find_thresholds(bench, data, "refined", ["--policy", RELOCATING]),
-            "plain": find_thresholds(bench, data, "plain", ["--policy", AS_PUBLISHED]),
-            "by_rule": find_thresholds(bench, data, "by_rule", BY_RULE)}
+def find_both_thresholds(bench: Bench, data: DataSet, policy: Words | None = None) -> dict[str, Thresholds]:
+    """As found by default, perhaps with a policy; and as published: by the rule of section 5.2 alone."""
+    return {"found": find_thresholds(bench, data, "found", policy), "by_rule": find_thresholds(bench, data, "by_rule", BY_RULE)}
 
 
-def contestants_with(thresholds: dict[str, Thresholds], limit: float, enough: float) -> list[Contestant]:
+def contestants_with(thresholds: dict[str, Thresholds], limit: float, enough: float,
+                     policy: Words | None = None) -> list[Contestant]:
     """All poses, and all loops that the distance test finds ("tested"), then few of both with each of these thresholds."""
     def one(name: str, strategy: str, of: str, more: Words) -> Contestant:
         return Contestant(name, ["--strategy", strategy, "--thresholds", thresholds[of].file, *more], limit, enough)
-    published = ["--policy", AS_PUBLISHED]
-    return [one("tested", "apal", "refined", []), one("fpfl", "fpfl", "refined", ["--policy", RELOCATING]),
-            one("plain", "fpfl", "plain", published), one("by_rule", "fpfl", "by_rule", published)]
+    return [one("tested", "apal", "found", []), one("fpfl", "fpfl", "found", policy or []),
+            one("by_rule", "fpfl", "by_rule", ["--policy", AS_PUBLISHED])]
 
 
 def run_seeds(bench: Bench, data: DataSet, contestant: Contestant, seeds: int,

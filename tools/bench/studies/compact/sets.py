@@ -12,7 +12,7 @@ from ...reports import Json, contestant, items, median_of, number, paired_ratio,
 from ...rounds import Contestant, entries_of, run_rounds
 from ...study import Bench, Keep, Study, for_each_set
 from ...words import digits, milliseconds, times, total, whole
-from .runs import (ALL_LOOPS, ERRORS, Thresholds, ate, contestants_with, error_of, find_three_thresholds, named_once, over, part_kept,
+from .runs import (ALL_LOOPS, ERRORS, Thresholds, ate, contestants_with, error_of, find_both_thresholds, named_once, over, part_kept,
                    run_compact, run_seeds, summary, tenths, with_dagger, with_truth)
 
 # A run is given up after so many seconds, and repeated as long as all together take less than this: the studies of
@@ -39,7 +39,7 @@ def has_converged(bench: Bench, data: DataSet, graph: str, chi2: float) -> bool:
 
 
 def measure_control(bench: Bench, plain: DataSet, data: DataSet, thresholds: Thresholds, name: str, draw: str) -> Json:
-    """As many poses and loops as with the refined thresholds, drawn at random; how many of the runs have converged."""
+    """As many poses and loops as with the thresholds found, drawn at random; how many of the runs have converged."""
     graph = str(bench.cairn.work / "control.g2o")
     control = Contestant(name, ["--strategy", "rfpfl", "--draw", draw, "--thresholds", thresholds.file, "-o", graph], LIMIT)
     converged = 0
@@ -54,12 +54,12 @@ def measure_control(bench: Bench, plain: DataSet, data: DataSet, thresholds: Thr
 
 def measure_set(bench: Bench, plain: DataSet) -> Json:
     data = with_truth(bench, plain)
-    thresholds = find_three_thresholds(bench, data)
+    thresholds = find_both_thresholds(bench, data)
     contestants = contestants_with(thresholds, LIMIT, ENOUGH)
     run_rounds(bench.rounds_of_runs, contestants, lambda c: run_compact(bench, data, c.arguments, c.limit), summary)
-    refined = thresholds["refined"]
-    contestants.append(all_of_all(bench, data, refined, contestants[0]))
-    controls = [measure_control(bench, plain, data, refined, name, draw)
+    found = thresholds["found"]
+    contestants.append(all_of_all(bench, data, found, contestants[0]))
+    controls = [measure_control(bench, plain, data, found, name, draw)
                 for name, draw in [("random", "loops"), ("random_poses", "poses")]]
     return {"name": data.name, "de_facto": data.truth == "de_facto", **{of: t.found for of, t in thresholds.items()},
             "contestants": [*entries_of(contestants), *controls]}
@@ -92,7 +92,7 @@ def thresholds_table(entries: list[Json]) -> str:
         some = []
         if is_of_paper(entry):
             some.append(["the paper's", *(digits(of_paper(entry, option)) for option in options), "", ""])
-        for found, title in [("by_rule", "by the rule"), ("plain", "without relocation"), ("refined", "refined")]:
+        for found, title in [("by_rule", "by the rule"), ("found", "found")]:
             # Options are kept as they are written on the command line.
             values = [text(entry, f"{found}.options.{option}") for option in options]
             some.append([title, *(digits(float(value)) if value else "-" for value in values),
@@ -118,7 +118,7 @@ def times_table(entries: list[Json]) -> str:
     for entry in entries:
         apal, fpfl = contestant(entry, "tested"), contestant(entry, "fpfl")
         graph = [text(entry, "name"), whole(median_of(fpfl, "poses.in")), whole(median_of(fpfl, "loops.in"))]
-        for name, title in [("fpfl", "refined"), ("plain", "without relocation"), ("by_rule", "as published")]:
+        for name, title in [("fpfl", "found"), ("by_rule", "as published")]:
             c = contestant(entry, name)
             rows.append([*graph, title, total(apal), total(c), faster(apal, c), part_of(c, "loops"), part_of(c, "poses"),
                          milliseconds(median_of(apal, "steps.p99")), milliseconds(median_of(c, "steps.p99"))])
@@ -133,9 +133,8 @@ def times_table(entries: list[Json]) -> str:
 
 # A strategy with one way of putting poses back.
 ESTIMATES = [("APAL", "apal", "v2"), ("APAL, distance test", "tested", "v2"), ("FPFL", "fpfl", "v2"),
-             ("FPFL, `likely`", "fpfl", "likely"), ("FPFL without relocation", "plain", "v2"),
-             ("FPFL as published", "by_rule", "v2"), ("RFPFL, loops first", "random", "v2"),
-             ("RFPFL, poses first", "random_poses", "v2")]
+             ("FPFL, `likely`", "fpfl", "likely"), ("FPFL as published", "by_rule", "v2"),
+             ("RFPFL, loops first", "random", "v2"), ("RFPFL, poses first", "random_poses", "v2")]
 
 
 def errors_of_paper(entry: Json, strategy: str) -> list[float]:
@@ -189,14 +188,12 @@ def recovery_table(entries: list[Json]) -> str:
         some, paper = [], []
         for recovery in ["v0", "v1", "v2", "likely"]:
             errors = [error_of(contestant(entry, "by_rule"), error, recovery) for error in ERRORS]
-            relocated = [error_of(contestant(entry, "fpfl"), error, recovery) for error in ERRORS[:2]]
-            some.append([recovery, *map(digits, errors + relocated)])
+            some.append([recovery, *map(digits, errors)])
             errors = errors_of_paper(entry, recovery)
             if math.isfinite(errors[0]):
-                paper.append([f"the paper's {recovery}", *map(digits, errors), "", ""])
+                paper.append([f"the paper's {recovery}", *map(digits, errors)])
         rows += named_once(some + paper, text(entry, "name"))
-    return table(["graph", "recovery", "ATE [m]", "[°]", "RPE [m]", "[°]", "all to all [m]", "[°]",
-                  "with relocation: ATE [m]", "[°]"], rows)
+    return table(["graph", "recovery", "ATE [m]", "[°]", "RPE [m]", "[°]", "all to all [m]", "[°]"], rows)
 
 
 def sections(entries: list[Json]) -> Sections:

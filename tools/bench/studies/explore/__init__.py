@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from ...study import Study
-from . import floors, thesis
+from . import cover, floors, thesis
 
-STUDIES: list[Study] = [*thesis.STUDIES, *floors.STUDIES]
+STUDIES: list[Study] = [*thesis.STUDIES, *cover.STUDIES, *floors.STUDIES]

@@ -114,6 +114,12 @@ def row_of(claim: str, inequalities: list[Inequality], methods: dict[str, Json])
     return [claim, verdict, "; ".join(against), "; ".join(in_favour)]
 
 
+def claim_verdicts(part: str, methods: list[Json]) -> dict[str, str]:
+    """Of each claim: "seen, clear of zero", "seen", "not seen", "not measured"."""
+    by_name = {text(method, "method"): method for method in reversed(methods)}
+    return {claim: row_of(claim, inequalities, by_name)[1] for claim, inequalities in CLAIMS[part].items()}
+
+
 def claims_table(part: str, methods: list[Json]) -> str:
     by_name = {text(method, "method"): method for method in reversed(methods)}
     return table(["claim", "seen?", "differences that speak against it", "and for it"],

@@ -13,6 +13,16 @@ from ...reports import NONE, Json, items, member, number, text
 from ...study import Bench, tell
 
 
+FLOORS = ["cave_20m", "fr079", "intel_lab", "hospital_40m", "willow_full", "stata_basement", "depot", "warehouse",
+          "simple_rooms", "tb3_sandbox"]
+
+
+def all_floors(bench: Bench) -> list[DataSet]:
+    floors = [floor for floor in (floor_of(bench, name, "") for name in FLOORS) if floor.graph]
+    floors = floors or [DataSet(kind, kind) for kind in ["@rooms", "@corridor", "@loop", "@cave"]]
+    return floors[:2] if bench.quick else floors
+
+
 def floor_of(bench: Bench, name: str, generated: str) -> DataSet:
     """The floor of the data, or what is generated in its place."""
     file = (bench.data or Path()) / "maps" / f"{name}.yaml"
@@ -20,15 +30,16 @@ def floor_of(bench: Bench, name: str, generated: str) -> DataSet:
 
 
 def measure(bench: Bench, part: str, floor: DataSet, method: str, explorer: str, runs: int, settings: Words) -> Json:
-    """One method on one floor, with some seeds. Explorers without a plugin in this build are kept as missing."""
+    """One method on one floor, with some seeds; explorer "": the default. Explorers without a plugin in this build are kept as
+    missing."""
     entry: Json = {"part": part, "name": floor.name, "method": method, "explorer": explorer}
-    if explorer.partition(":")[0] not in bench.cairn.names("explorer"):
+    if explorer and explorer.partition(":")[0] not in bench.cairn.names("explorer"):
         tell(f"explore, {part}: {explorer} is not in this build: left out")
         return {**entry, "missing": True}
     tell(f"explore, {part}: {method} on {floor.name}, {runs} runs")
     curves = str(bench.cairn.work / f"explore_{part}_{method}.csv")
     limit = 120.0 if bench.quick else 3600.0  # so that the whole takes an hour [s]
-    run = bench.cairn.on("explore", floor, ["--explorer", explorer, "--runs", str(runs), "--curves", curves, *settings],
+    run = bench.cairn.on("explore", floor, [*(["--explorer", explorer] if explorer else []), "--runs", str(runs), "--curves", curves, *settings],
                          min(os.cpu_count() or 1, 2), limit)
     entry["in_time"] = run.outcome.in_time
     if run.report is None:
