@@ -572,7 +572,7 @@ void add_compact_options(ArgumentParser cli, CompactOptions& options,
       .show_default();
   cli.add_option("--strategy", options.strategy,
                  "few poses with all measurements (whole), or as a robot drives, all or few poses "
-                 "and loops: apal, apfl, fpfl [whole; fpfl with --map, landmarks or another "
+                 "and loops: apal, apfl, fpfl [whole; fpfl with --map or another "
                  "registration]")
       .type_name("NAME")
       .one_of(std::move(strategies));

@@ -222,7 +222,7 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   /// without a recording.
   std::optional<std::unordered_map<Id, std::vector<Id>>> recorded_;
   double radius_ = 0.0;  ///< no pose farther away can be a candidate [m]
-  double driven_ = 0.0;  ///< since all kept poses were looked at last, by odometry [m]
+  double driven_ = 0.0;  ///< since all kept poses were tested last, by odometry [m]
   Matrix sensor_;        ///< Σ̄_y, if it was given; else that of `typical_`
   double loop_gain_ = 0.0, pose_gain_ = 0.0, prior_gain_ = 0.0;  // [nats]
   double landmark_gain_ = 0.0, landmark_loss_ = 0.0;             // [nats]

@@ -53,7 +53,7 @@ OptionFields<O> range_fields() {
             "(s)")
       .boolean("wide", &O::wide,
                "where the newest pose is more uncertain than twice the range, all kept poses are "
-               "looked at each time it has driven five ranges, and the most probable are "
+               "tested each time it has driven five ranges, and the most probable are "
                "proposed whose probability is more than s times that of a displacement with mean "
                "zero; false: never")
       .real("noise_scale", &O::noise_scale, 0.0, 1.0,

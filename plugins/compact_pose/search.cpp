@@ -21,7 +21,7 @@ constexpr double kAhead = 2.0;
 /// From so many ranges on the newest pose is too uncertain for the distance test: one pose in ten
 /// that is in reach, its mean off by 1.6 deviations, fails it with s = 0.1, and all from 8 on.
 constexpr double kUncertain = 2.0;
-/// All kept poses are looked at then, each time so many ranges have been driven.
+/// All kept poses are tested then, each time so many ranges have been driven.
 constexpr double kEvery = 5.0;
 /// So many are proposed besides, the most probable.
 constexpr std::size_t kMostWide = 64;
@@ -165,7 +165,7 @@ void CompactPose::search() {
 }
 
 /// Whether the newest pose is so uncertain that equation 18 excludes poses that it may well see,
-/// and has moved since that was looked at last.
+/// and has moved since they were tested last.
 bool CompactPose::looks_wide() {
   const bool tested = options_.search == Search::index || options_.search == Search::all;
   if (!tested || !options_.wide || range_.probability <= 0.0) return false;

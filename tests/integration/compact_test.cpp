@@ -12,6 +12,8 @@
 #include <sstream>
 #include <string>
 
+#include <fmt/core.h>
+
 #include "cairn/plugin/registry.hpp"
 #include "integration/process.hpp"
 
@@ -197,7 +199,6 @@ TEST_F(Compact, SaysWhyThereIsNoWholeMap) {
   };
   EXPECT_THAT(message({kWorld, "--registration", "recorded:false_rate=0.1"}),
               HasSubstr("--strategy whole: what matches is not what was recorded"));
-  EXPECT_THAT(message({"@landmarks2d:poses=60"}), HasSubstr("the recording has landmarks"));
   EXPECT_THAT(message({kWorld, "--policy", "random_poses:poses=10"}),
               HasSubstr("policy 'random_poses' has no strategies"));
   EXPECT_THAT(message({kWorld, "--policy", "compact_pose:strategy=apfl"}), HasSubstr("give one"));
@@ -525,9 +526,10 @@ TEST_F(Compact, KeepsTheMeasurementsOfLandmarksThatAreInformative) {
     return report_of(arguments);
   };
   const auto all = run({"--strategy", "apal"});
-  const auto few =
-      run({"-o", folder_.file("map.g2o"), "--policy", "compact_pose:landmark_gain=1.05"});
-  const auto many = run({});
+  const auto few = run({"-o", folder_.file("map.g2o"), "--strategy", "fpfl", "--policy",
+                        "compact_pose:landmark_gain=1.05"});
+  const auto many = run({"--strategy", "fpfl"});
+  const auto whole = run({});
   EXPECT_EQ(all.at("observations").at("kept"), all.at("observations").at("in"));
   EXPECT_EQ(all.at("landmarks").at("kept"), all.at("landmarks").at("in"));
   const auto count = [](const auto& report, const char* what) {
@@ -536,7 +538,11 @@ TEST_F(Compact, KeepsTheMeasurementsOfLandmarksThatAreInformative) {
   EXPECT_LT(count(few, "observations"), count(many, "observations"));
   EXPECT_LT(count(many, "observations"), count(all, "observations"));
   EXPECT_LT(count(few, "poses"), 200);
-  for (const auto* report : {&all, &few, &many}) {
+  EXPECT_EQ(count(whole, "poses"), count(many, "poses"));
+  EXPECT_EQ(count(whole, "observations"), count(all, "observations"));
+  EXPECT_EQ(count(whole, "landmarks"), count(all, "landmarks"));
+  EXPECT_LT(whole.at("check").at("distance").to_number<double>(), 0.02);
+  for (const auto* report : {&all, &few, &many, &whole}) {
     const auto& nees = report->at("nees");
     const double ratio =
         nees.at("squared").to_number<double>() / nees.at("dof").to_number<double>();
@@ -544,12 +550,43 @@ TEST_F(Compact, KeepsTheMeasurementsOfLandmarksThatAreInformative) {
     EXPECT_LT(ratio, 1.4);
   }
   EXPECT_LT(few.at("rmse").to_number<double>(), 3.0 * all.at("rmse").to_number<double>());
+  EXPECT_NEAR(whole.at("rmse").to_number<double>(), all.at("rmse").to_number<double>(), 1e-3);
   EXPECT_THAT(read_text(folder_.file("map.g2o")), HasSubstr("EDGE_SE2_XY"));
   // It can be continued.
   const Outcome again =
       cairn({"compact", "@landmarks2d:poses=40", "--map", folder_.file("map.g2o")});
   EXPECT_EQ(again.exit_code, 3);
   EXPECT_THAT(again.err, HasSubstr("is in the map and in the recording"));
+}
+
+// A landmark of which a single pose knows the bearing alone.
+TEST_F(Compact, WhereALandmarkIsNotDeterminedThereIsNoWholeMap) {
+  const std::string world = folder_.file("world.g2o"), bearings = folder_.file("bearings.g2o");
+  ASSERT_EQ(cairn({"generate", "landmarks2d:poses=60,sensor=bearing_range", "-o", world}).exit_code,
+            0);
+  std::istringstream lines(read_text(world));
+  std::string kept, first;
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    std::string tag, pose, landmark, bearing, range, information;
+    words >> tag >> pose >> landmark >> bearing >> range >> information;
+    if (tag == "EDGE_BEARING_RANGE_SE2_XY") {
+      if (landmark == first) continue;
+      if (first.empty()) {
+        first = landmark;
+        line =
+            fmt::format("{} {} {} {} {} {} 0 0", tag, pose, landmark, bearing, range, information);
+      }
+    }
+    kept += line + '\n';
+  }
+  write_text(bearings, kept);
+  const auto report = report_of({"compact", bearings, "--quiet"});
+  EXPECT_EQ(report.at("strategy").as_string(), "fpfl");
+  EXPECT_EQ(report.at("landmarks").at("undetermined").as_int64(), 1);
+  const Outcome run = cairn({"compact", bearings});
+  EXPECT_THAT(run.err, HasSubstr("does not determine all landmarks"));
+  EXPECT_EQ(report_of({"compact", world, "--quiet"}).at("strategy").as_string(), "whole");
 }
 
 // A robust loss takes weight from measurements, so that they tell no more than without it.

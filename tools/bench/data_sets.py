@@ -163,10 +163,10 @@ def budget_sets(data: Path | None, quick: bool) -> list[DataSet]:
 # by its v.
 
 
-def ellipse3d(more: str = "") -> DataSet:
-    """`more`: options of the generator."""
-    return DataSet("ellipse3d", "@ellipse3d:translation_error=0,rotation_error=0,translation_sigma=0.058,rotation_sigma=0.032"
-                   + more, LOGARITHM)
+def ellipse3d(more: str = "", noise: float = 1.0) -> DataSet:
+    """`more`: options of the generator; `noise`: a factor of the paper's standard deviations."""
+    return DataSet("ellipse3d" + (f", noise × {noise:g}" if noise != 1.0 else ""), "@ellipse3d:translation_error=0,rotation_error=0,"
+                   f"translation_sigma={0.058 * noise:.6g},rotation_sigma={0.032 * noise:.6g}" + more, LOGARITHM)
 
 
 def ellipse_n(laps: int, more: str = "") -> DataSet:

@@ -403,7 +403,7 @@ graph: poses with odometry by rising id, whose gaps other measurements bridge, l
 policy: a name of `cairn.components("pose_policy")`; its options are further keyword arguments.
 strategy: "whole", the poses that the policy keeps with the information of all measurements of the graph; or what a robot
     can know while it drives: "fpfl", few poses and few loop closures, "apfl", all poses, "apal", all of both. None:
-    "whole", and "fpfl" where that cannot be: with map=, landmarks, or another registration than "recorded".
+    "whole", and "fpfl" where that cannot be: with map=, or another registration than "recorded".
 registration: measures the pairs that the policy proposes: a name of `cairn.components("registration")`, of which
     "recorded" answers by the graph; or written in Python, a function match(proposal) that is given a MatchProposal and
     returns a Factor, several, or None for no match. An object with such a method may have three more:

@@ -18,6 +18,9 @@ namespace {
 
 /// All that may leave does, but for the poses that the job names; those with few neighbours first.
 constexpr const char* kSelection = "smallest_blanket:part=1";
+/// Nothing relates two landmarks that a pose has seen, so that factors that fit their own blanket
+/// alone are too certain in the whole graph.
+constexpr const char* kWithLandmarks = "sparsify:fit=scaled";
 /// Information has to be positive.
 constexpr double kLeastWeight = 1e-9;
 
@@ -39,14 +42,25 @@ Graph weighted(const Graph& graph) {
   return result;
 }
 
+std::int64_t points_of(const Graph& graph) {
+  std::int64_t points = 0;
+  for (int v = 0; v < graph.variable_count(); ++v) points += is_point(graph.type(v));
+  return points;
+}
+
 SparsifyResult take_out(const Graph& all, const PolicySetting& setting, const PolicyResult& chosen,
                         const std::function<void(const SparsifyProgress&)>& progress) {
-  SparsifyJob job{.sparsifier = parse_component("sparsify"),
+  SparsifyJob job{.sparsifier = parse_component(points_of(all) > 0 ? kWithLandmarks : "sparsify"),
                   .selection = parse_component(kSelection),
                   .optimizer = parse_component("levenberg_marquardt"),
                   .as_given = true};
-  for (int v = 0; v < chosen.compact.variable_count(); ++v)
-    job.stay.push_back(chosen.compact.id(v));
+  for (int v = 0; v < chosen.compact.variable_count(); ++v) {
+    if (!is_point(chosen.compact.type(v))) job.stay.push_back(chosen.compact.id(v));
+  }
+  // Landmarks are what a map is for.
+  for (int v = 0; v < all.variable_count(); ++v) {
+    if (is_point(all.type(v))) job.stay.push_back(all.id(v));
+  }
   return sparsify_whole(weighted(all), job,
                         {.registry = setting.registry,
                          .stop = {.interrupt = setting.interrupt},
@@ -60,12 +74,6 @@ Graph without_factors(const Graph& graph) {
   return poses;
 }
 
-int poses_of(const Graph& graph) {
-  int poses = 0;
-  for (int v = 0; v < graph.variable_count(); ++v) poses += !is_point(graph.type(v));
-  return poses;
-}
-
 void replace(PolicyResult& result, const EstimateOfAll& all, SparsifyResult sparse,
              const PolicySetting& setting) {
   result.compact = std::move(sparse.sparse);
@@ -73,7 +81,10 @@ void replace(PolicyResult& result, const EstimateOfAll& all, SparsifyResult spar
   result.chi2 = all.chi2;
   result.kept_loops = setting.data.loops;
   result.kept_priors = setting.data.priors;
-  result.kept_poses = poses_of(result.compact);
+  result.kept_landmarks = points_of(result.compact);
+  result.kept_observations = setting.data.observations;
+  result.nonlinear_observations = result.undetermined_landmarks = 0;
+  result.kept_poses = result.compact.variable_count() - static_cast<int>(result.kept_landmarks);
   result.converged = sparse.converged;
   result.information_nonzeros = sparse.nonzeros_after.information;
   result.factor_nonzeros = sparse.nonzeros_after.factor;
@@ -96,8 +107,8 @@ OptionValues lower_pose_gain(const PolicyJob& job, const PolicySetting& setting)
 std::string why_no_whole_map(const PolicyJob& job, const PolicySetting& setting) {
   if (!matches_as_recorded(job))
     return "what matches is not what was recorded, and so there is no map of all measurements";
-  if (setting.data.landmarks > 0) return "the recording has landmarks";
-  if (std::ssize(setting.data.poses) != setting.data.recording.variable_count())
+  if (std::ssize(setting.data.poses) + setting.data.landmarks !=
+      setting.data.recording.variable_count())
     return "the recording has poses of earlier sessions";
   return {};
 }
@@ -115,6 +126,10 @@ WholeMap take_whole_map(const PolicyJob& job, const PolicySetting& setting,
   if (sparse.interrupted) {
     result.interrupted = true;
     map.why_not = "it was interrupted before the map of all measurements was made";
+    return map;
+  }
+  if (!sparse.error && setting.data.landmarks > 0) {
+    map.why_not = "what was measured does not determine all landmarks";
     return map;
   }
   const bool absolute = setting.data.priors > 0;

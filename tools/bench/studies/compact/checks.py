@@ -18,14 +18,14 @@ LIMIT = 120.0  # of a run [s]
 FALSE_RATE, GATE = 0.1, 0.99
 
 
-def measure_errors(bench: Bench, thresholds: Thresholds, strategy: str) -> Json:
-    """The same drive with other noise each time, and thresholds from yet another."""
-    arguments = ["--strategy", strategy, "--thresholds", thresholds.file]
+def measure_errors(bench: Bench, thresholds: Thresholds, noise: float, strategy: str, keep: int) -> Json:
+    """The same drive with other noise each time, and thresholds from yet another; perhaps with so many poses at most."""
+    arguments = ["--strategy", strategy, "--thresholds", thresholds.file, "--keep", str(keep)]
     if strategy == "apal":
         arguments += ["--policy", ALL_LOOPS]
-    runs = [run_compact(bench, ellipse3d(f",seed={seed}"), arguments).report["nees"]
+    runs = [run_compact(bench, ellipse3d(f",seed={seed}", noise), arguments).report["nees"]
             for seed in range(1, 11 if bench.quick else 101)]
-    return {"part": "nees", "name": "ellipse3d", "strategy": strategy, "runs": runs}
+    return {"part": "nees", "name": ellipse3d(noise=noise).name, "strategy": strategy, "keep": keep, "runs": runs}
 
 
 def measure_comparison(bench: Bench, plain_data: DataSet) -> Json:
@@ -39,8 +39,9 @@ def measure_comparison(bench: Bench, plain_data: DataSet) -> Json:
 def study_consistency(bench: Bench, keep: Keep) -> None:
     tell("compact, consistency: normalised errors")
     thresholds = find_thresholds(bench, ellipse3d(",seed=1000"), "found")
-    for strategy in ["fpfl", "apal"]:
-        keep(measure_errors(bench, thresholds, strategy))
+    for noise in [1.0, 0.1]:  # by how much the second differs is the error of linearising
+        for strategy, most in [("apal", 0), ("fpfl", 0), ("fpfl", 30)]:
+            keep(measure_errors(bench, thresholds, noise, strategy, most))
     for_each_set("compact, covariances", compact_sets_named(["ellipse3d", "parking-garage"], bench.data, bench.quick),
                  lambda data: keep(measure_comparison(bench, data)))
 
@@ -80,8 +81,8 @@ def nees_table(entries: list[Json]) -> str:
         mean = ratio(sum(number(run, "squared") for run in known), dof)
         half = two_sided * math.sqrt(ratio(2.0, dof))  # of chi2 / dof, for many DoF
         verdict = "overconfident" if mean > 1.0 + half else "conservative" if mean < 1.0 - half else "consistent"
-        strategy = text(entry, "strategy")
-        rows.append([text(entry, "name"), TITLES.get(strategy, strategy), str(len(known)), whole(dof), f"{mean:.4f}",
+        strategy, most = TITLES.get(text(entry, "strategy"), text(entry, "strategy")), number(entry, "keep")
+        rows.append([text(entry, "name"), strategy + (f", `--keep {most:.0f}`" if most > 0 else ""), str(len(known)), whole(dof), f"{mean:.4f}",
                      f"{1.0 - half:.4f} … {1.0 + half:.4f}", verdict])
     return table(["graph", "strategy", "runs", "DoF in total", "NEES/DoF", "95 % if consistent", "verdict"], rows)
 

@@ -34,12 +34,13 @@ struct WholeMap {
 };
 
 /// Why a run of `job` cannot end in such a map, whatever is measured: matches are not those of the
-/// recording (`matches_as_recorded`), or the recording has landmarks, or poses of earlier sessions.
-/// Empty: it can.
+/// recording (`matches_as_recorded`), or the recording has poses of earlier sessions. Empty: it
+/// can.
 CAIRN_API std::string why_no_whole_map(const PolicyJob& job, const PolicySetting& setting);
 
 /// Replaces what a run has found by what all measurements say: takes the poses that the policy has
-/// not kept out of their estimate, by factors that stand for theirs (`sparsify_whole`). The compact
+/// not kept out of their estimate, by factors that stand for theirs (`sparsify_whole`); all
+/// landmarks stay. The compact
 /// graph of `result` is then what is left, at its minimum; the trajectory is the estimate of all
 /// measurements; chi2 is that of all measurements, of which all are kept; errors are under the name
 /// "whole". Nothing is replaced where `why_not` says why. `all` is of the same recording
