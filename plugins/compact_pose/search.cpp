@@ -139,7 +139,6 @@ void CompactPose::search() {
     solved_version_ = graph_.version();
   }
   graph_.prepare(possible, report_.seconds);
-  report_.seconds.search -= report_.seconds.covariances - solving;
   expect_matches();
   for (const int pose : possible) {
     Displacement d = graph_.displacement(pose);
@@ -158,6 +157,7 @@ void CompactPose::search() {
   }
   report_.near = static_cast<int>(std::ssize(near));
   if (looks_wide()) search_wide();
+  report_.seconds.search -= report_.seconds.covariances - solving;
   // One that may leave is matched only where no other can be.
   const auto lasts = [&](const Candidate& one) { return !graph_.temporary(one.pose); };
   if (std::ranges::any_of(candidates_, lasts)) std::erase_if(candidates_, std::not_fn(lasts));
