@@ -23,7 +23,7 @@
 #include "cairn/policy/threshold_search.hpp"
 #include "cairn/policy/uncertainty_comparison.hpp"
 #include "cairn/runtime/error.hpp"
-#include "cairn/sparsification/whole_map.hpp"
+#include "cairn/sparsification/compaction.hpp"
 #include "commands.hpp"
 #include "compact.hpp"
 #include "compact_report.hpp"
@@ -151,30 +151,16 @@ bool names_thresholds(const CompactOptions& options, const ComponentSpec& policy
          !options.thresholds.empty() || gives_thresholds(policy);
 }
 
-constexpr std::string_view kWhole = "whole";
-
 /// What to run, and the thresholds.
 struct Job {
-  PolicyJob job;
-  FoundThresholds found = {};  ///< or read
-  UsedThresholds thresholds = {};
-  std::string strategy = {};  ///< empty: the policy has none
-  std::int64_t sample = 0;    ///< poses in which the thresholds were found
-  OptionValues to_save = {};  ///< thresholds for another run
-  bool is_whole() const { return strategy == kWhole; }
+  CompactionJob compaction;
+  OptionValues given = {};  ///< of the policy, on the command line
+  std::int64_t sample = 0;  ///< poses in which thresholds that are read were found
 };
 
-/// So many poses from the first on: a sample without loop closures would tell nothing.
-std::size_t sample_size(const CompactOptions& options, const PolicyData& data,
-                        const Session& session) {
-  const auto [asked, count] = threshold_sample(data, options.sample);
-  if (count != asked) {
-    session.note(
-        fmt::format("the first {} poses have too few loop closures to find thresholds: the sample "
-                    "is {} of {} poses",
-                    asked, count, data.poses.size()));
-  }
-  return count;
+/// In how many poses the thresholds of a run were found; 0: not known, or not found.
+std::int64_t sample_of(const Job& job, const Compaction& made) {
+  return made.sample.count > 0 ? static_cast<std::int64_t>(made.sample.count) : job.sample;
 }
 
 /// What thresholds allow was checked for a run as long as their sample.
@@ -191,93 +177,77 @@ void note_short_sample(std::int64_t sample, const CompactOptions& options, const
                                  : "Find them here, without --thresholds"));
 }
 
-/// The strategy of a run: that wanted, or what the policy's own options say; empty: it has none.
-std::string strategy_of(const CompactOptions& options, const std::string& wanted,
-                        const ComponentSpec& policy, const OptionTable& table) {
-  if (!table.find("strategy")) {
-    if (!options.strategy.empty())
-      throw Error(ErrorCode::usage, fmt::format("policy '{}' has no strategies", policy.name));
-    return {};
-  }
-  const auto own = policy.values.find("strategy");
-  if (own == policy.values.end()) return wanted;
-  if (!options.strategy.empty() && own->second != options.strategy)
-    throw Error(ErrorCode::usage, "--strategy, and strategy among the policy's options: give one");
-  return own->second;
-}
-
-/// Of a whole map and of one at random the policy chooses how many poses, or which.
+/// The strategy of the policy that was run: of a whole map it chooses how many poses.
 std::string strategy_of_policy(const std::string& strategy) {
-  return strategy == kWhole || strategy == "rfpfl" ? "fpfl" : strategy;
+  return strategy == kWholeStrategy ? "fpfl" : strategy;
 }
 
-Job prepare(const CompactOptions& options, const std::string& strategy,
-            const PolicySetting& setting, const Session& session) {
+/// A study is of what a robot would do, and a control of as many poses and loops.
+std::string strategy_asked_for(const CompactOptions& options, const ComponentSpec& policy,
+                               const OptionTable& table) {
+  if (options.strategy == "rfpfl") return "fpfl";
+  const bool open = table.find("strategy") && !policy.values.contains("strategy");
+  return options.strategy.empty() && options.is_study && open ? "fpfl" : options.strategy;
+}
+
+Job prepare(const CompactOptions& options, const Recording& recording, Session& session) {
+  const PolicyData& data = recording.data;
   Job result;
-  PolicyJob& job = result.job;
-  job.registration = options.registration;
-  if (strategy == "rfpfl") {
-    if (setting.data.landmarks > 0) {
+  CompactionJob& job = result.compaction;
+  job.job.registration = options.registration;
+  if (options.strategy == "rfpfl") {
+    if (data.landmarks > 0) {
       throw Error(
           ErrorCode::usage,
           fmt::format("--strategy rfpfl draws poses and loop closures, and the graph has {}, "
                       "which it does not take: give --strategy apal, apfl or fpfl, or leave "
                       "the landmarks and what is measured of them out of the graph",
-                      plural(setting.data.landmarks, "landmark")));
+                      plural(data.landmarks, "landmark")));
     }
     // The control draws from what was recorded, so the policy has no more to choose from.
     ComponentSpec registration = parse_component(options.registration);
     if (registration.name == "recorded") registration.values.emplace("carry", "0");
-    job.registration = spec_text(registration);
+    job.job.registration = spec_text(registration);
   }
-  job.policy = parse_component(options.policy);
-  const auto emplace = [&](const OptionValues& values) {
-    for (const auto& [name, value] : values) job.policy.values.emplace(name, value);
-  };
-  bool automatic = options.automatic || (!names_thresholds(options, job.policy) &&
-                                         finds_thresholds(job.policy, setting.registry));
-  if (automatic && !options.automatic && setting.data.loops == 0 && setting.data.observations > 0) {
-    automatic = false;
-    session.note(
-        "there are landmarks and no loop closures between poses, in which to find thresholds: "
-        "those of the policy's defaults are used");
+  ComponentSpec& policy = job.job.policy = parse_component(options.policy);
+  if (options.automatic) {
+    job.find = true;
+  } else if (names_thresholds(options, policy)) {
+    job.find = false;
   }
-  emplace(given_thresholds(options));
-  const OptionValues given = job.policy.values;
-  if (!options.estimator.empty()) emplace({{"estimator", options.estimator}});
-  const OptionTable& table = setting.registry.options(PosePolicy::kKind, job.policy.name);
-  result.strategy = strategy_of(options, strategy, job.policy, table);
+  for (const auto& [name, value] : given_thresholds(options)) policy.values.emplace(name, value);
+  result.given = policy.values;
+  if (!options.estimator.empty()) policy.values.emplace("estimator", options.estimator);
   if (!options.thresholds.empty()) {
-    SavedThresholds saved = read_thresholds(options.thresholds, job.policy.name);
-    result.found.options = std::move(saved.options);
+    SavedThresholds saved = read_thresholds(options.thresholds, policy.name);
+    job.thresholds = std::move(saved.options);
     result.sample = saved.poses;
   }
-  if (automatic) {
-    const std::size_t count = sample_size(options, setting.data, session);
-    result.sample = static_cast<std::int64_t>(count);
-    // The error of a whole map does not depend on which loop closures the policy uses: thresholds
-    // are lowered for another run alone.
-    if (result.is_whole() && !options.save_thresholds.empty()) {
-      const FoundThresholds others = find_thresholds(job, count, options.error_ratio, setting);
-      result.to_save = used_thresholds(given, others.options, table).options;
-    }
-    result.found =
-        find_thresholds(job, count, result.is_whole() ? 0.0 : options.error_ratio, setting);
-    if (setting.interrupted()) return result;
-  }
-  if (!result.is_whole()) note_short_sample(result.sample, options, setting.data, session);
-  emplace(result.found.options);
-  result.thresholds = used_thresholds(given, result.found.options, table);
-  if (result.to_save.empty()) result.to_save = result.thresholds.options;
-  if (!given.empty()) result.sample = 0;
-  // Not while thresholds are found, for which all measurements of the sample are used.
-  if (options.keep > 0 &&
-      !job.policy.values.emplace("keep", fmt::format("{}", options.keep)).second)
-    throw Error(ErrorCode::usage, "--keep, and keep among the policy's options: give one");
-  if (!result.strategy.empty()) emplace({{"strategy", strategy_of_policy(result.strategy)}});
-  // The policy's own map is not kept, so that relocation costs nothing.
-  if (result.is_whole() && table.find("reuse")) emplace({{"reuse", "true"}});
+  job.strategy = strategy_asked_for(options, policy,
+                                    session.registry().options(PosePolicy::kKind, policy.name));
+  job.sample = options.sample;
+  job.error_ratio = options.error_ratio;
+  job.keep = options.keep;
+  job.recovery = parse_enum<Recovery>(options.recovery, "--recovery");
+  job.map = recording.map ? &*recording.map : nullptr;
   return result;
+}
+
+/// Thresholds for another run: for one that is not `whole` they are found with its errors in mind.
+SavedThresholds thresholds_to_save(const CompactOptions& options, const Job& job,
+                                   const Compaction& made, const UsedThresholds& used,
+                                   const PolicySetting& setting) {
+  SavedThresholds saved{.options = used.options,
+                        .poses = job.given.empty() ? sample_of(job, made) : 0};
+  if (made.strategy != kWholeStrategy || made.found.options.empty()) return saved;
+  PolicyJob other{.policy = parse_component(options.policy), .registration = options.registration};
+  other.policy.values = job.given;
+  const FoundThresholds found =
+      find_thresholds(other, made.sample.count, options.error_ratio, setting);
+  saved.options = used_thresholds(job.given, found.options,
+                                  setting.registry.options(PosePolicy::kKind, other.policy.name))
+                      .options;
+  return saved;
 }
 
 void check(const CompactOptions& options, Session& session) {
@@ -301,7 +271,7 @@ void check(const CompactOptions& options, Session& session) {
 void note_defaults(const CompactOptions& options, const CompactOutcome& outcome, Session& session) {
   if (!finds_thresholds(parse_component(options.policy), session.registry())) return;
   const std::string defaults =
-      replaceable_defaults(outcome.thresholds, strategy_of_policy(outcome.strategy));
+      replaceable_defaults(outcome.thresholds, strategy_of_policy(outcome.made.strategy));
   if (defaults.empty() || outcome.data.loops == 0) return;  // or a search would find none
   session.note(
       fmt::format("some thresholds are given, so no others were looked for: of {} the policy's "
@@ -336,81 +306,20 @@ std::string option_words(const OptionValues& options, const std::string& policy,
 
 void note_advice(const SelectionCheck::Advice& advice, const CompactOptions& options,
                  const CompactOutcome& outcome, const Session& session) {
-  const bool automatic = outcome.found.seconds > 0.0;
+  const bool automatic = outcome.made.found.seconds > 0.0;
   session.note(
       fmt::format("{}; {} {}", advice.finding,
                   option_words(advice.options, parse_component(options.policy).name, automatic),
                   advice.effect));
 }
 
-/// A user who asked for few poses and got all of them, or no loop closure, learns why, and what
-/// would help.
-void note_selection(const CompactOptions& options, const CompactOutcome& outcome,
-                    Session& session) {
-  const PolicyResult& result = outcome.result;
-  if (strategy_of_policy(outcome.strategy) != "fpfl" || outcome.control) return;
-  if (result.interrupted || !result.located) return;
-  if (!finds_thresholds(parse_component(options.policy), session.registry())) return;
-  SelectionCheck check;
-  for (const PoseReport& pose : result.poses) check.add(pose);
-  const bool automatic = outcome.found.seconds > 0.0;
-  // A whole map has all loop closures, whichever the policy uses.
-  const std::int64_t loops = outcome.whole ? 0 : outcome.data.loops;
-  for (const SelectionCheck::Advice& advice :
-       check.advice(automatic ? &outcome.found : nullptr, loops))
-    note_advice(advice, options, outcome, session);
-}
-
 /// A map that is far from that of all measurements has lost more than its covariances say.
-void note_distance(const CompactOptions& options, const CompactOutcome& outcome,
-                   const Session& session) {
-  if (outcome.whole) {
-    if (outcome.whole->advice) note_advice(*outcome.whole->advice, options, outcome, session);
-  } else if (outcome.check && outcome.check->is_far()) {
-    session.note(fmt::format(
-        "the map is {}: --strategy whole keeps as few poses with the estimate of all measurements, "
-        "a lower --loop-gain uses more loop closures",
-        outcome.check->to_string()));
-  }
-}
-
-/// The strategy: `whole` by default, where it can be.
-std::string choose_strategy(const CompactOptions& options, const Recording& recording,
-                            const PolicySetting& setting) {
-  if (!options.strategy.empty() && options.strategy != kWhole) return options.strategy;
-  if (options.is_study) return "fpfl";
-  const ComponentSpec policy = parse_component(options.policy);
-  const bool has_strategies =
-      setting.registry.options(PosePolicy::kKind, policy.name).find("strategy") != nullptr;
-  if (options.strategy.empty() && (!has_strategies || policy.values.contains("strategy")))
-    return "fpfl";  // or its own
-  const std::string why_not =
-      recording.map
-          ? "the trajectory continues a map (--map)"
-          : why_no_whole_map({.policy = {}, .registration = options.registration}, setting);
-  if (why_not.empty()) return std::string(kWhole);
-  if (options.strategy.empty()) return "fpfl";
-  throw Error(ErrorCode::usage, fmt::format("--strategy {}: {}", kWhole, why_not));
-}
-
-/// For the strategy `whole`: the estimate of all measurements, without those that contradict the
-/// others, which leave the recording. Nothing, and a note, where there is none.
-std::optional<EstimateOfAll> estimate_all(Recording& recording, const PolicySetting& setting,
-                                          const Session& session) {
-  StatusLine line(session.common.quiet);
-  if (line.on_terminal()) line.show("optimising all measurements");
-  EstimateOfAll all = estimate_of_all(setting);
-  line.clear();
-  if (!all.why_not.empty()) {
-    if (!setting.interrupted())
-      session.note(fmt::format("the map is that of --strategy fpfl: {}", all.why_not));
-    return std::nullopt;
-  }
-  if (const std::string words = left_out_in_words(all, recording.data); !words.empty()) {
-    session.note(words);
-    recording.data = without_contradictions(std::move(recording.data), all);
-  }
-  return all;
+void note_distance(const CompactOutcome& outcome, const Session& session) {
+  if (outcome.made.whole || !outcome.check || !outcome.check->is_far()) return;
+  session.note(fmt::format(
+      "the map is {}: --strategy whole keeps as few poses with the estimate of all measurements, "
+      "a lower --loop-gain uses more loop closures",
+      outcome.check->to_string()));
 }
 
 }  // namespace
@@ -425,6 +334,8 @@ int run_compact(const CompactOptions& options, Session& session) {
   note_lost_measurements(recording, options, session);
   const InterruptGuard guard;  // until the results are written
   PolicyProgress progress(session.common.quiet);
+  NodeProgress nodes(session.common.quiet);
+  StatusLine line(session.common.quiet);
   const PolicySetting setting{
       .data = recording.data,
       .registry = registry,
@@ -435,70 +346,67 @@ int run_compact(const CompactOptions& options, Session& session) {
         progress.show(title, count, counts);
       }};
   Results results(session);
-  const Recovery recovery = parse_enum<Recovery>(options.recovery, "--recovery");
+  const Job job = prepare(options, recording, session);
   std::optional<UncertaintyComparison> comparison;
   if (!options.compare.empty())
     comparison.emplace(recording.data, registry.make<Estimator>("incremental_cholesky"));
-  const auto run_job = [&](const PolicyJob& chosen, UncertaintyComparison* compare) {
-    PolicyRun run(chosen, setting);
-    if (recording.map) run.load(*recording.map);
-    run.run(recording.data.poses.size(), chosen.policy.name, [&](std::size_t index) {
-      if (compare) compare->add(index, run.policy());
-    });
-    progress.clear();
-    return run.finish(recovery);
-  };
-  std::string strategy = choose_strategy(options, recording, setting);
-  std::optional<EstimateOfAll> all;
-  if (strategy == kWhole) {
-    all = estimate_all(recording, setting, session);
-    if (!all) strategy = "fpfl";
-  }
-  Job job = prepare(options, strategy, setting, session);
-  if (guard.interrupted()) {
-    progress.clear();
+  Compaction made = compact_recording(job.compaction, recording.data, setting,
+                                      {.note =
+                                           [&](const std::string& sentence) {
+                                             progress.clear();
+                                             session.note(sentence);
+                                           },
+                                       .optimising =
+                                           [&](bool done) {
+                                             if (done) line.clear();
+                                             if (!done && line.on_terminal())
+                                               line.show("optimising all measurements");
+                                           },
+                                       .pose =
+                                           [&](std::size_t pose, PosePolicy& policy) {
+                                             if (comparison) comparison->add(pose, policy);
+                                           },
+                                       .removing =
+                                           [&](const SparsifyProgress& at) {
+                                             progress.clear();
+                                             nodes.show(at);
+                                           }});
+  progress.clear();
+  if (made.result.interrupted && made.result.poses.empty()) {
     session.note("interrupted before anything was selected");
     return kExitInterrupted;
   }
-  PolicyResult result = run_job(job.job, comparison ? &*comparison : nullptr);
-  std::optional<WholeMap> whole;
-  if (job.is_whole()) {
-    NodeProgress nodes(session.common.quiet);
-    whole = take_whole_map(job.job, setting, *all, result,
-                           [&](const SparsifyProgress& at) { nodes.show(at); });
-    if (!whole->why_not.empty()) {
-      session.note(fmt::format("the map is that of --strategy fpfl: {}", whole->why_not));
-      whole.reset();
-      job.strategy = "fpfl";
-    }
-  }
+  const std::string& policy = made.job.policy.name;
+  const UsedThresholds thresholds = used_thresholds(
+      job.given, made.found.options.empty() ? job.compaction.thresholds : made.found.options,
+      registry.options(PosePolicy::kKind, policy));
+  if (made.strategy != kWholeStrategy)
+    note_short_sample(sample_of(job, made), options, recording.data, session);
   results.write(options.save_thresholds, [&] {
-    write_thresholds(options.save_thresholds, job.job.policy.name,
-                     {.options = job.to_save, .poses = job.sample});
+    write_thresholds(options.save_thresholds, policy,
+                     thresholds_to_save(options, job, made, thresholds, setting));
   });
   CompactOutcome outcome{.name = recording.name,
-                         .strategy = job.strategy,
                          .data = recording.data,
-                         .found = job.found,
-                         .thresholds = job.thresholds,
-                         .result = std::move(result),
-                         .control = {},
-                         .whole = std::move(whole)};
-  if (all) {
-    outcome.left_out = all->left_out_on;
-    outcome.loops_left_out = all->loops_left_out;
-  }
+                         .thresholds = thresholds,
+                         .made = std::move(made)};
   if (options.strategy == "rfpfl") {
-    PolicyJob random = job.job;
-    random.policy = {"random_poses",
-                     {{"poses", fmt::format("{}", outcome.result.kept_poses)},
-                      {"loops", fmt::format("{}", outcome.result.kept_loops)},
-                      {"draw", options.draw},
-                      {"seed", fmt::format("{}", options.seed)}}};
-    outcome.control = run_job(random, nullptr);
+    const PolicyResult& chosen = outcome.made.result;
+    PolicyRun run({.policy = {"random_poses",
+                              {{"poses", fmt::format("{}", chosen.kept_poses)},
+                               {"loops", fmt::format("{}", chosen.kept_loops)},
+                               {"draw", options.draw},
+                               {"seed", fmt::format("{}", options.seed)}}},
+                   .registration = outcome.made.job.registration},
+                  setting);
+    if (recording.map) run.load(*recording.map);
+    run.run(recording.data.poses.size(), "random_poses");
+    progress.clear();
+    outcome.control = run.finish(job.compaction.recovery);
   }
   const PolicyResult& shown = outcome.shown();
-  outcome.check = outcome.whole ? outcome.whole->check : check_map(job.job, shown, setting);
+  outcome.check =
+      outcome.control ? check_map(outcome.made.job, shown, setting) : outcome.made.check;
   results.write(options.output, [&] {
     write_graph(shown.compact, options.output, registry,
                 output_format(options.output, options.output_format));
@@ -518,11 +426,11 @@ int run_compact(const CompactOptions& options, Session& session) {
     session.write_json(report);
   });
   note_defaults(options, outcome, session);
-  note_selection(options, outcome, session);
-  note_distance(options, outcome, session);
-  if (outcome.whole) {
-    for (const std::string& note : outcome.whole->notes) session.note(note);
+  if (!outcome.control) {
+    for (const SelectionCheck::Advice& advice : outcome.made.advice)
+      note_advice(advice, options, outcome, session);
   }
+  note_distance(outcome, session);
   results.add([&] { session.print(summary_text(options, outcome, results, session)); });
   results.finish();
   if (guard.interrupted()) return kExitInterrupted;

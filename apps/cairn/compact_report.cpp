@@ -137,7 +137,7 @@ std::string loops_text(const PolicyResult& result, const PolicyData& data, bool 
 void add_result(Table& table, const CompactOutcome& outcome) {
   const PolicyResult& result = outcome.shown();
   const PolicyData& data = outcome.data;
-  const FoundThresholds& found = outcome.found;
+  const FoundThresholds& found = outcome.made.found;
   const auto in = static_cast<std::int64_t>(std::ssize(result.poses));
   const std::int64_t kept = result.kept_poses - result.map_poses;
   table.add(
@@ -145,11 +145,11 @@ void add_result(Table& table, const CompactOutcome& outcome) {
        fmt::format("{} of {} kept ({})", kept, in, percent(kept, in)) +
            (result.map_poses > 0 ? fmt::format(", beside {} of the map", result.map_poses) : "")});
   if (data.loops > 0 || result.registered > 0)
-    table.add(
-        {"loops", loops_text(result, data, outcome.whole.has_value(), outcome.loops_left_out)});
-  if (outcome.whole) {
-    table.add({"factors", fmt::format("{} for {}, KLD {:.3g} nats", outcome.whole->factors_out,
-                                      outcome.whole->factors_in, outcome.whole->kld)});
+    table.add({"loops", loops_text(result, data, outcome.made.whole.has_value(),
+                                   outcome.made.loops_left_out)});
+  if (outcome.made.whole) {
+    table.add({"factors", fmt::format("{} for {}, KLD {:.3g} nats", outcome.made.whole->factors_out,
+                                      outcome.made.whole->factors_in, outcome.made.whole->kld)});
   }
   if (data.priors > 0) {
     table.add({"priors", fmt::format("{} of {} kept ({})", result.kept_priors, data.priors,
@@ -171,8 +171,9 @@ void add_result(Table& table, const CompactOutcome& outcome) {
   }
   const StepTimes times(step_seconds(result));
   const std::string whole =
-      outcome.whole ? fmt::format(", then {} for the whole", seconds_text(outcome.whole->seconds))
-                    : "";
+      outcome.made.whole
+          ? fmt::format(", then {} for the whole", seconds_text(outcome.made.whole->seconds))
+          : "";
   table.add(
       {"time",
        fmt::format("{} (estimate {}, covariances {}, search {}){}",
@@ -197,23 +198,23 @@ void add_result(Table& table, const CompactOutcome& outcome) {
 json::object report_json(const CompactOptions& options, const CompactOutcome& outcome) {
   json::object report = begin_report("compact");
   report["graph"] = graph_json(outcome.data.recording, outcome.name);
-  report["strategy"] = text_json(outcome.strategy);
+  report["strategy"] = text_json(outcome.made.strategy);
   report["registration"] = options.registration;
   report["threads"] = threads();
-  report["status"] = outcome.result.interrupted  ? "interrupted"
-                     : !outcome.shown().located  ? "unlocated"
-                     : outcome.shown().converged ? "converged"
-                                                 : "max_iterations";
-  report["thresholds"] = thresholds_json(outcome.thresholds, outcome.found);
+  report["status"] = outcome.made.result.interrupted ? "interrupted"
+                     : !outcome.shown().located      ? "unlocated"
+                     : outcome.shown().converged     ? "converged"
+                                                     : "max_iterations";
+  report["thresholds"] = thresholds_json(outcome.thresholds, outcome.made.found);
   for (auto& [name, value] : result_json(outcome.shown(), outcome.data)) report[name] = value;
-  report["loops"].as_object()["in"] = outcome.data.loops + outcome.loops_left_out;
-  if (outcome.control) report["like"] = result_json(outcome.result, outcome.data);
+  report["loops"].as_object()["in"] = outcome.data.loops + outcome.made.loops_left_out;
+  if (outcome.control) report["like"] = result_json(outcome.made.result, outcome.data);
   if (outcome.check) {
     report["check"] = {{"distance", outcome.check->distance}, {"extent", outcome.check->extent}};
   } else {
     report["check"] = nullptr;
   }
-  if (const auto& whole = outcome.whole) {
+  if (const auto& whole = outcome.made.whole) {
     report["whole"] = {{"kld", number_json(whole->kld)},
                        {"factors", {{"in", whole->factors_in}, {"out", whole->factors_out}}},
                        {"seconds", whole->seconds}};
@@ -221,12 +222,12 @@ json::object report_json(const CompactOptions& options, const CompactOutcome& ou
     report["whole"] = nullptr;
   }
   json::array left_out;
-  for (const std::vector<Id>& on : outcome.left_out)
+  for (const std::vector<Id>& on : outcome.made.left_out)
     left_out.emplace_back(json::array(on.begin(), on.end()));
   report["left_out"] = std::move(left_out);
   report["recovery"] = options.recovery;
   report["map"] = text_json(options.map);
-  report["located"] = outcome.result.located;
+  report["located"] = outcome.made.result.located;
   report["truth"] = text_json(options.truth);
   report["output"] = text_json(options.output);
   report["trajectory"] = text_json(options.trajectory);
@@ -286,12 +287,12 @@ std::string summary_text(const CompactOptions& options, const CompactOutcome& ou
                                   plural(data.recording.variable_count() - data.landmarks, "pose"),
                                   landmarks, plural(data.loops, "loop closure"))});
   add_metric(table, data.recording, session);
-  if (!outcome.strategy.empty()) table.add({"strategy", outcome.strategy});
+  if (!outcome.made.strategy.empty()) table.add({"strategy", outcome.made.strategy});
   if (const std::string line = thresholds_line(outcome.thresholds); !line.empty())
     table.add({"thresholds", line});
   add_result(table, outcome);
   if (outcome.check) table.add({"check", outcome.check->to_string()});
-  if (outcome.result.interrupted) {
+  if (outcome.made.result.interrupted) {
     table.add({"status", "interrupted"});
   } else if (!outcome.shown().located) {
     table.add({"status", "unlocated: no pose was matched with one of the map"});

@@ -7,11 +7,8 @@
 
 #include <boost/json/fwd.hpp>
 
-#include "cairn/policy/map_check.hpp"
-#include "cairn/policy/policy_run.hpp"
-#include "cairn/policy/threshold_search.hpp"
 #include "cairn/policy/uncertainty_comparison.hpp"
-#include "cairn/sparsification/whole_map.hpp"
+#include "cairn/sparsification/compaction.hpp"
 #include "compact.hpp"
 #include "results.hpp"
 #include "used_thresholds.hpp"
@@ -20,21 +17,15 @@ namespace cairn::app {
 
 /// What a run of `cairn compact` came to.
 struct CompactOutcome {
-  const std::string& name;      ///< of the graph
-  const std::string& strategy;  ///< empty: the policy has none
+  const std::string& name;  ///< of the graph
   const PolicyData& data;
-  const FoundThresholds& found;      ///< by a search; none: there was none
   const UsedThresholds& thresholds;  ///< of the run, whatever was found
-  PolicyResult result;
-  std::optional<PolicyResult> control;  ///< as many poses and loops at random
-  std::optional<WholeMap> whole = {};   ///< `result` is of all measurements
-  /// Those that contradict the others and have left the recording: the ids of each.
-  std::vector<std::vector<Id>> left_out = {};
-  int loops_left_out = 0;              ///< loop closures among them
-  std::optional<MapCheck> check = {};  ///< of what is shown
+  Compaction made;
+  std::optional<PolicyResult> control = {};  ///< as many poses and loops at random
+  std::optional<MapCheck> check = {};        ///< of what is shown
 
   /// What is written and shown.
-  const PolicyResult& shown() const { return control ? *control : result; }
+  const PolicyResult& shown() const { return control ? *control : made.result; }
 };
 
 boost::json::object report_json(const CompactOptions& options, const CompactOutcome& outcome);

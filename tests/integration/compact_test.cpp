@@ -185,7 +185,7 @@ TEST_F(Compact, ThereIsNoWholeMapWhereMostLoopClosuresAreWrong) {
   const std::string world = "@manhattan:poses=200,streets=5,outliers=400";
   const Outcome run = cairn({"compact", world, "--json", folder_.file("report.json")});
   EXPECT_THAT(on_one_line(run.err),
-              HasSubstr("the map is that of --strategy fpfl: measurements contradict each other"));
+              HasSubstr("the map is that of strategy fpfl: measurements contradict each other"));
   EXPECT_EQ(parse_json(read_text(folder_.file("report.json"))).at("strategy").as_string(), "fpfl");
 }
 
@@ -198,7 +198,7 @@ TEST_F(Compact, SaysWhyThereIsNoWholeMap) {
     return on_one_line(run.err);
   };
   EXPECT_THAT(message({kWorld, "--registration", "recorded:false_rate=0.1"}),
-              HasSubstr("--strategy whole: what matches is not what was recorded"));
+              HasSubstr("strategy whole: what matches is not what was recorded"));
   EXPECT_THAT(message({kWorld, "--policy", "random_poses:poses=10"}),
               HasSubstr("policy 'random_poses' has no strategies"));
   EXPECT_THAT(message({kWorld, "--policy", "compact_pose:strategy=apfl"}), HasSubstr("give one"));

@@ -21,14 +21,9 @@
 #include "bound_graph.hpp"
 #include "cairn/evaluation/plausibility.hpp"
 #include "cairn/plugin/registry.hpp"
-#include "cairn/policy/map_check.hpp"
-#include "cairn/policy/policy_run.hpp"
-#include "cairn/policy/selection_check.hpp"
-#include "cairn/policy/threshold_search.hpp"
 #include "cairn/runtime/enum_names.hpp"
 #include "cairn/runtime/error.hpp"
-#include "cairn/sparsification/whole_map.hpp"
-#include "cairn/text/spelling.hpp"
+#include "cairn/sparsification/compaction.hpp"
 #include "component_names.hpp"
 #include "follower.hpp"
 #include "interrupt.hpp"
@@ -56,155 +51,33 @@ struct BoundResult {
   }
 };
 
-/// What is run, and how.
-struct Plan {
-  PolicyJob job;
-  std::string strategy{};  ///< empty: `whole` where it can be
-  std::optional<PythonRegistration> own{};
-  std::optional<bool> automatic;  ///< whether thresholds are found; none: unless some are given
-  double sample = 0.6;
-  double error_ratio = 2.5;
-  int keep = 0;
-  Recovery recovery = Recovery::distribute;
-  std::optional<Graph> map{};
-  std::shared_ptr<const Loss> loss;
-  FactorSelector loss_on{};
-};
-
-constexpr const char* kWhole = "whole";
-
-/// The strategy of the plan, or of the policy's options; by default `whole` where that can be.
-/// Empty: the policy has none.
-std::string strategy_of(const Plan& plan, const PolicySetting& setting) {
-  const ComponentSpec& policy = plan.job.policy;
-  const auto own = policy.values.find("strategy");
-  if (own != policy.values.end()) {
-    if (!plan.strategy.empty() && plan.strategy != own->second) {
-      throw Error(ErrorCode::usage, "strategy= is given, and among the policy's options: give one");
-    }
-    return own->second;
-  }
-  const OptionSpec* const has_some =
-      setting.registry.options(PosePolicy::kKind, policy.name).find("strategy");
-  if (!has_some && !plan.strategy.empty())
-    throw Error(ErrorCode::usage, fmt::format("policy '{}' has no strategies", policy.name));
-  if (!plan.strategy.empty()) {
-    std::vector<std::string> names = has_some->choices;
-    names.emplace_back(kWhole);
-    if (std::ranges::find(names, plan.strategy) == names.end()) {
-      throw Error(ErrorCode::usage, fmt::format("strategy cannot be '{}'{}", plan.strategy,
-                                                what_is_on_offer(plan.strategy, names)));
-    }
-  }
-  if (!has_some || (!plan.strategy.empty() && plan.strategy != kWhole)) return plan.strategy;
-  const std::string why_not =
-      plan.map ? "the trajectory continues a map (map=)" : why_no_whole_map(plan.job, setting);
-  if (why_not.empty()) return kWhole;
-  if (plan.strategy.empty()) return "fpfl";
-  throw Error(ErrorCode::usage, fmt::format("strategy={}: {}", kWhole, why_not));
-}
-
-/// A job of this strategy with the thresholds that are found for it. False: interrupted.
-bool complete(const Plan& plan, const PolicySetting& setting, PolicyJob& job, BoundResult& out) {
-  Registry& registry = setting.registry;
-  job = plan.job;
-  OptionValues& options = job.policy.values;
-  const bool automatic = plan.automatic.value_or(
-      !gives_thresholds(job.policy) && finds_thresholds(job.policy, registry) &&
-      (setting.data.loops > 0 || setting.data.observations == 0));
-  if (automatic) {
-    const ThresholdSample sample = threshold_sample(setting.data, plan.sample);
-    // The error of a whole map does not depend on which loop closures the policy uses.
-    const double ratio = out.strategy == kWhole ? 0.0 : plan.error_ratio;
-    out.found = find_thresholds(job, sample.count, ratio, setting);
-    if (setting.interrupted()) return false;
-    for (const auto& [name, value] : out.found.options) options.emplace(name, value);
-  }
-  if (plan.keep > 0 && !options.emplace("keep", fmt::format("{}", plan.keep)).second)
-    throw Error(ErrorCode::usage, "keep= is given, and among the policy's options: give one");
-  if (!out.strategy.empty())
-    options.emplace("strategy", out.strategy == kWhole ? "fpfl" : out.strategy);
-  // The policy's own map is not kept, so that relocation costs nothing.
-  if (out.strategy == kWhole && registry.options(PosePolicy::kKind, job.policy.name).find("reuse"))
-    options.emplace("reuse", "true");
-  return true;
-}
-
-/// Runs the policy. False: interrupted before that.
-bool select(const Plan& plan, const PolicySetting& setting, Follower& follower, PolicyJob& job,
-            BoundResult& out) {
-  if (!complete(plan, setting, job, out)) {
-    out.result.interrupted = true;
-    out.notes.emplace_back("interrupted before anything was selected");
-    return false;
-  }
-  follower.follow();
-  PolicyRun policy(job, setting);
-  if (plan.map) policy.load(*plan.map);
-  policy.run(setting.data.poses.size(), job.policy.name);
-  out.result = policy.finish(plan.recovery);
-  return true;
-}
-
-/// The estimate of all measurements, without those that contradict the others, which leave the
-/// recording. Nothing, and a note, where there is none: the strategy is `fpfl` then.
-std::optional<EstimateOfAll> estimate_all(const PolicySetting& setting, BoundResult& out) {
-  EstimateOfAll all = estimate_of_all(setting);
-  if (!all.why_not.empty()) {
-    out.strategy = "fpfl";
-    if (!setting.interrupted())
-      out.notes.push_back(fmt::format("the map is that of strategy fpfl: {}", all.why_not));
-    return std::nullopt;
-  }
-  if (std::string words = left_out_in_words(all, out.data); !words.empty()) {
-    out.notes.push_back(std::move(words));
-    out.left_out = all.left_out_on;
-    out.data = without_contradictions(std::move(out.data), all);
-  }
-  return all;
-}
-
-/// Their map in the place of the policy's own.
-void make_whole(const PolicySetting& setting, const PolicyJob& job, const EstimateOfAll& all,
-                BoundResult& out) {
-  WholeMap whole = take_whole_map(job, setting, all, out.result);
-  if (!whole.why_not.empty()) {
-    out.strategy = "fpfl";
-    out.notes.push_back(fmt::format("the map is that of strategy fpfl: {}", whole.why_not));
-    return;
-  }
-  out.notes.insert(out.notes.end(), whole.notes.begin(), whole.notes.end());
-  out.check = whole.check;
-  out.whole = std::move(whole);
-}
-
 /// Without the interpreter's lock.
-void run(const Plan& plan, const PolicySetting& setting, Follower& follower, BoundResult& out) {
-  PolicyJob job;
-  out.strategy = strategy_of(plan, setting);
-  std::optional<EstimateOfAll> all;
-  if (out.strategy == kWhole) all = estimate_all(setting, out);
-  if (!select(plan, setting, follower, job, out)) return;
-  if (all) make_whole(setting, job, *all, out);
-  if (!out.whole) out.check = check_map(job, out.result, setting);
-  if (out.whole) {
-    if (out.whole->advice) out.notes.push_back(to_string(*out.whole->advice));
-  } else if (out.check && out.check->is_far()) {
+void run(const CompactionJob& job, const PolicySetting& setting, Follower& follower,
+         BoundResult& out) {
+  Compaction made = compact_recording(
+      job, out.data, setting,
+      {.note = [&](const std::string& sentence) { out.notes.push_back(sentence); },
+       .selecting = [&] { follower.follow(); }});
+  const PolicyResult& result = made.result;
+  if (result.interrupted && result.poses.empty())
+    out.notes.emplace_back("interrupted before anything was selected");
+  for (const SelectionCheck::Advice& advice : made.advice) out.notes.push_back(to_string(advice));
+  if (!made.whole && made.check && made.check->is_far()) {
     out.notes.push_back(fmt::format(
         "the map is {}: strategy='whole' keeps as few poses with the estimate of all measurements, "
         "a lower loop_gain uses more loop closures",
-        out.check->to_string()));
+        made.check->to_string()));
   }
-  SelectionCheck check;
-  for (const PoseReport& pose : out.result.poses) check.add(pose);
-  const FoundThresholds* found = out.found.seconds > 0.0 ? &out.found : nullptr;
-  if (!out.result.interrupted && out.result.located &&
-      finds_thresholds(job.policy, setting.registry)) {
-    const std::int64_t loops = out.whole ? 0 : setting.data.loops;
-    for (const auto& advice : check.advice(found, loops)) out.notes.push_back(to_string(advice));
+  if (!result.poses.empty()) {
+    for (std::string& doubt : notes_on_estimate(result.compact, chi2(result.compact)).notes)
+      out.notes.push_back(std::move(doubt));
   }
-  for (std::string& doubt : notes_on_estimate(out.result.compact, chi2(out.result.compact)).notes)
-    out.notes.push_back(std::move(doubt));
+  out.result = std::move(made.result);
+  out.found = std::move(made.found);
+  out.check = made.check;
+  out.whole = std::move(made.whole);
+  out.left_out = std::move(made.left_out);
+  out.strategy = std::move(made.strategy);
 }
 
 const Graph& graph_of(const py::object& given, const char* what) {
@@ -221,28 +94,28 @@ std::unique_ptr<BoundResult> compact(BoundGraph& recording, const std::string& p
                                      const std::string& recovery, const py::object& loss,
                                      const std::string& loss_on, const py::object& callback,
                                      const py::kwargs& options) {
-  Plan plan{.job = {component_spec(policy, options, PosePolicy::kKind, "compact")},
-            .strategy = strategy.value_or(""),
-            .automatic = automatic,
-            .sample = sample,
-            .keep = keep,
-            .recovery = parse_enum<Recovery>(recovery, "recovery"),
-            .loss = loss_of(loss)};
+  CompactionJob job{
+      .job = {component_spec(policy, options, PosePolicy::kKind, "compact"), "recorded", nullptr},
+      .strategy = strategy.value_or(""),
+      .find = automatic,
+      .sample = sample,
+      .keep = keep,
+      .recovery = parse_enum<Recovery>(recovery, "recovery")};
   if (!(sample > 0.0 && sample <= 1.0))
     throw Error(ErrorCode::usage, "sample: expected a part of the poses, above 0 and at most 1");
   if (keep < 0) throw Error(ErrorCode::usage, "keep: expected a number of poses, or 0 for any");
-  if (!loss.is_none()) plan.loss_on = selector_of(loss_on);
+  std::optional<PythonRegistration> own;
   if (py::isinstance<py::str>(registration)) {
-    plan.job.registration = registration.cast<std::string>();
+    job.job.registration = registration.cast<std::string>();
   } else {
-    plan.job.own = &plan.own.emplace(registration);
+    job.job.own = &own.emplace(registration);
   }
-  std::optional<Graph> true_graph;
+  std::optional<Graph> true_graph, earlier;
   if (!truth.is_none()) true_graph = graph_of(truth, "truth").clone();
-  if (!map.is_none()) plan.map = graph_of(map, "map").clone();
+  if (!map.is_none()) job.map = &earlier.emplace(graph_of(map, "map").clone());
   auto out = std::make_unique<BoundResult>();
   out->data = policy_data(recording.get().clone(), std::move(true_graph), begin,
-                          plan.map ? Gaps::refuse : Gaps::bridge);
+                          earlier ? Gaps::refuse : Gaps::bridge);
   if (std::string bridged = to_string(out->data.gaps); !bridged.empty())
     out->notes.push_back(std::move(bridged));
   const InterruptGuard guard;
@@ -250,23 +123,23 @@ std::unique_ptr<BoundResult> compact(BoundGraph& recording, const std::string& p
   const PolicySetting setting{
       .data = out->data,
       .registry = default_registry(),
-      .loss = plan.loss,
-      .loss_on = plan.loss_on,
+      .loss = loss_of(loss),
+      .loss_on = loss.is_none() ? FactorSelector() : selector_of(loss_on),
       .interrupt = &follower.stop(),
       .progress = [&](std::string_view, std::size_t, const PolicyResult& counts) {
         follower.after(counts.poses.back());
       }};
   try {
     const py::gil_scoped_release unlocked;
-    run(plan, setting, follower, *out);
+    run(job, setting, follower, *out);
   } catch (const Error&) {
-    if (plan.own) plan.own->rethrow();
+    if (own) own->rethrow();
     follower.rethrow();
     throw;
   }
   guard.absorb();
   follower.rethrow();
-  if (plan.own) plan.own->rethrow();
+  if (own) own->rethrow();
   out->compact = std::make_unique<BoundGraph>(std::move(out->result.compact));
   out->trajectory = std::make_unique<BoundGraph>(std::move(out->result.trajectory));
   return out;
