@@ -43,7 +43,6 @@ std::string truth_text(const ExplorationResult& result) {
   if (const auto error = error_of(result))
     parts.push_back(fmt::format("error {:.3f} m, {:.2f}° (ATE, aligned)", error->ate_translation,
                                 error->ate_rotation));
-  parts.push_back(fmt::format("{:.3f} m expected by the covariances", result.expected_ate));
   return fmt::format("{}", fmt::join(parts, "; "));
 }
 
@@ -168,7 +167,9 @@ std::string summary_text(const ExploreOutcome& outcome) {
   table.add({"map", fmt::format("{:.1f} m² known", result.map.coverage())});
   table.add({"graph", fmt::format("{} of {} kept, {}", result.graph.variable_count(),
                                   plural(result.trajectory.variable_count(), "pose"),
-                                  plural(result.slam.loops, "loop closure"))});
+                                  plural(result.slam.loops, "loop closure")) +
+                          fmt::format("; an error of {:.3f} m by the covariances (ATE)",
+                                      result.expected_ate)});
   if (const std::string truth = truth_text(result); !truth.empty()) table.add({"truth", truth});
   table.add({"time",
              fmt::format("{} deciding, {} mapping, {} estimating, {} matching scans",

@@ -216,6 +216,7 @@ LinkReport CompactPose::offer(Id other, std::span<const Factor> measured) {
     } else if (waits) {
       if (!graph_.newest_kept()) graph_.keep(report_.seconds);
       learnt_.push_back({other, graph_.newest_id(), link.covariance, report.gain, false});
+      driven_ = kInfinity;  // what agrees with it may be seen from the next pose
       waiting_.push_back({std::move(link), report});
       if (waiting_.size() > kMostWaiting) {  // nothing has agreed with it for so long
         waiting_.front().report.verdict = LinkVerdict::inconsistent;

@@ -52,10 +52,10 @@ OptionFields<O> range_fields() {
             "probability of being within range, in each dimension, that makes a pose a candidate "
             "(s)")
       .boolean("wide", &O::wide,
-               "where the newest pose is more uncertain than twice the range, all kept poses are "
-               "tested each time it has driven five ranges, and the most probable are "
-               "proposed whose probability is more than s times that of a displacement with mean "
-               "zero; false: never")
+               "where the newest pose is more uncertain than twice the smallest range, all kept "
+               "poses are tested each time it has driven five times the largest, or a match waits "
+               "for another, and the most probable are proposed whose probability is more than s "
+               "times that of a displacement with mean zero; false: never")
       .real("noise_scale", &O::noise_scale, 0.0, 1.0,
             "how much smaller the errors of the measurements are than their covariances say, for "
             "that probability");

@@ -21,7 +21,8 @@ constexpr double kAhead = 2.0;
 /// From so many ranges on the newest pose is too uncertain for the distance test: one pose in ten
 /// that is in reach, its mean off by 1.6 deviations, fails it with s = 0.1, and all from 8 on.
 constexpr double kUncertain = 2.0;
-/// All kept poses are tested then, each time so many ranges have been driven.
+/// All kept poses are tested then, each time so many ranges have been driven, or a match waits for
+/// another.
 constexpr double kEvery = 5.0;
 /// So many are proposed besides, the most probable.
 constexpr std::size_t kMostWide = 64;
@@ -171,12 +172,13 @@ bool CompactPose::looks_wide() {
   if (!tested || !options_.wide || range_.probability <= 0.0) return false;
   const RigidGroup& group = graph_.group();
   const int n = group.dimension();
-  const double v = *std::min_element(range_.translation.begin(), range_.translation.begin() + n);
-  if (driven_ < kEvery * v) return false;
+  const auto [smallest, largest] =
+      std::minmax_element(range_.translation.begin(), range_.translation.begin() + n);
+  if (driven_ < kEvery * *largest) return false;
   const Eigen::Matrix<double, 6, 6> S =
       group.twist_covariance(graph_.newest_covariance(report_.seconds));
   const double deviation = range_.noise_scale * std::sqrt(S.diagonal().head(n).maxCoeff());
-  return deviation > kUncertain * v;
+  return deviation > kUncertain * *smallest;
 }
 
 /// Proposes besides the kept poses that are as probably within range, beside a displacement of mean

@@ -554,3 +554,32 @@ def test_arguments_of_the_wrong_kind_are_named():
 def test_false_of_numpy_ends_a_run():
     result = cairn.compact(city(poses=100)[0], callback=lambda report: np.bool_(report.id < 20), **OPTIONS)
     assert result.status == "interrupted" and len(result.poses) == 21
+
+
+def test_a_match_that_waits_for_another_is_followed_by_a_search_from_the_next_pose():
+    """Two laps of a circle of 40 m, whose poses coincide, with a range of 1.5 m where the pose is uncertain by 10 m: each search
+    finds one match, and matches that are five ranges apart do not confirm each other."""
+    rng = np.random.default_rng(3)
+    lap = 150
+
+    def true(k):
+        angle = 2 * np.pi * k / lap
+        return cairn.Pose2(40 * np.sin(angle), 40 * (1 - np.cos(angle)), angle)
+
+    def measured(a, b, sigmas):
+        return Factor(cairn.Between(a, b, true(a).between(true(b)).retract(np.array(sigmas) * rng.standard_normal(3))), sigmas=sigmas)
+
+    policy = cairn.PosePolicy("compact_pose", range=1.5, angle=3.14, loop_gain=1, pose_gain=1, gate=0.99)
+    verdicts = []
+    for k in range(2 * lap):
+        if k == 0:
+            policy.add_pose(k, value=cairn.Pose2())
+        else:
+            policy.add_pose(k, [measured(k - 1, k, [0.05, 0.05, 0.03])])
+        while (pair := policy.next_match()) is not None:
+            if pair.later - pair.earlier == lap:
+                verdicts.append(policy.offer(pair.earlier, [measured(pair.earlier, pair.later, [0.05, 0.05, 0.02])]).verdict)
+            else:
+                policy.offer(pair.earlier, None)
+        policy.end_pose()
+    assert sum(verdict == "linked" for verdict in map(str, verdicts)) > 50, verdicts

@@ -17,14 +17,16 @@ std::string odometry_alone(const RunFacts& facts) {
 }
 
 /// Drift within what the covariances say bends the map as well.
-std::string uncertain(const ExplorationResult& result) {
+std::string uncertain(const ExplorationResult& result, const RunFacts& facts) {
   constexpr double kMuch = 0.2;  // [m]
   if (!(result.expected_ate > kMuch)) return {};
   return fmt::format(
       "the positions are uncertain, by their covariances {:.2g} m (root mean square), after {} "
-      "loop closure{}: the map may be bent; a run that returns to places it has seen closes more "
-      "(--explorer errt_star, or a larger `range` of the policy and the sensor)",
-      result.expected_ate, result.slam.loops, result.slam.loops == 1 ? "" : "s");
+      "loop closure{}: the map may be bent{}",
+      result.expected_ate, result.slam.loops, result.slam.loops == 1 ? "" : "s",
+      facts.recorded ? ""
+                     : "; a run that returns to places it has seen closes more (explorer "
+                       "errt_star, or a larger `range` of the policy and the sensor)");
 }
 
 /// Where the registration refuses nearly all pairs, and has matched few scans, the map rests on
@@ -67,8 +69,8 @@ std::string not_driven(const RunFacts& facts) {
 std::vector<std::string> notes_of_end(const ExplorationResult& result, const RunFacts& facts) {
   std::vector<std::string> notes{not_driven(facts)};
   notes.insert(notes.end(), result.slam.notes.begin(), result.slam.notes.end());
-  for (const std::string& note : {odometry_alone(facts), uncertain(result), refused_matches(result),
-                                  unfinished(result, facts)})
+  for (const std::string& note : {odometry_alone(facts), uncertain(result, facts),
+                                  refused_matches(result), unfinished(result, facts)})
     notes.push_back(note);
   std::erase_if(notes, [](const std::string& note) { return note.empty(); });
   return notes;

@@ -6,6 +6,7 @@
 
 #include <fmt/core.h>
 
+#include "cairn/evaluation/plausibility.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/text/spelling.hpp"
 
@@ -145,6 +146,10 @@ class Maker {
   void take_whole() {
     WholeMap whole = take_whole_map(out_.job, setting_, all_, out_.result, watch_.removing);
     if (!whole.why_not.empty()) return fall_back(whole.why_not);
+    // Files have no losses: what they have removed is seen here alone.
+    if (all_.graph.has_losses()) {
+      for (const std::string& doubt : notes_on_estimate(all_.graph, all_.chi2).notes) note(doubt);
+    }
     out_.whole = std::move(whole);
   }
 
