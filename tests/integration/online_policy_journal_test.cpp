@@ -278,8 +278,8 @@ void compare_live_with_recorded(const TemporaryFolder& folder, const Lines& told
     ASSERT_EQ(cairn(arguments, {}, joined(part)).exit_code, 0);
   }
   EXPECT_EQ(read_text(folder.file("parts.g2o")), read_text(folder.file("whole.g2o")));
-  const Outcome again = cairn({"compact", graph, "--policy", policy, "--quiet", "-o",
-                               folder.file("recorded.g2o"), "--json", "-"});
+  const Outcome again = cairn({"compact", graph, "--strategy", "fpfl", "--policy", policy,
+                               "--quiet", "-o", folder.file("recorded.g2o"), "--json", "-"});
   ASSERT_EQ(again.exit_code, 0) << again.err;
   EXPECT_TRUE(read_text(folder.file("recorded.g2o")) == read_text(folder.file("whole.g2o")));
 }
@@ -355,8 +355,8 @@ TEST_F(OnlinePolicy, AbsoluteMeasurementsAreRestoredAndTheSameAsRecorded) {
   }
   write_text(folder_.file("recorded.g2o"), joined(recorded));
   const Outcome again =
-      cairn({"compact", folder_.file("recorded.g2o"), "--policy", policy, "--registration",
-             "recorded:carry=0", "-o", folder_.file("compact.g2o")});
+      cairn({"compact", "--strategy", "fpfl", folder_.file("recorded.g2o"), "--policy", policy,
+             "--registration", "recorded:carry=0", "-o", folder_.file("compact.g2o")});
   ASSERT_EQ(again.exit_code, 0) << again.err;
   EXPECT_THAT(again.out, HasSubstr("of 10 kept"));
   EXPECT_EQ(read_text(folder_.file("compact.g2o")), read_text(folder_.file("whole.g2o")));

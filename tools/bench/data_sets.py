@@ -46,6 +46,12 @@ def located(sets: Iterable[DataSet], data: Path | None) -> list[DataSet]:
     return [found for found in (one.located(data) for one in sets) if found]
 
 
+def every_graph(data: Path | None, quick: bool, folders: list[str]) -> list[DataSet]:
+    """All graphs in these folders of the data, by the names of their files; without any a generated one."""
+    files = [] if data is None or quick else [file for folder in folders for file in sorted((data / folder).glob("*.*"))]
+    return [DataSet(f"{file.parent.name}/{file.name}", str(file)) for file in files] or [SMALL_PLANE if quick else PLANE]
+
+
 def located_or(published: list[DataSet], data: Path | None, quick: bool, small: DataSet, generated: DataSet) -> list[DataSet]:
     """The published ones; if there are none or if it is to be quick, a generated one."""
     return [small] if quick else located(published, data) or [generated]
@@ -186,7 +192,7 @@ _COMPACTED = [
             "groundtruth/sphere2500_groundtruth_isam.txt"),
     DataSet("parking-garage", "pose3d/parking-garage.g2o", LIKE_G2O, "de_facto"),
     DataSet("10kHog-man", "pose2d/10kHog-man.graph.gz", [], "de_facto", truth_arguments=["--initial", "chordal"]),
-    DataSet("manhattanOlson3500", "pose2d/manhattanOlson3500_isam.txt", [], "file",
+    DataSet("manhattanOlson3500_isam", "pose2d/manhattanOlson3500_isam.txt", [], "file",
             "groundtruth/manhattanOlson3500_nodes_groundTruth.dat"),
     DataSet("city10000", "pose2d/city10000_isam.txt", [], "edges", "groundtruth/city10000_groundtruth_isam.txt"),
 ]
@@ -209,7 +215,7 @@ def simulated_sets(data: Path | None, quick: bool) -> list[tuple[DataSet, str]]:
         return [ellipse, (DataSet("manhattan, 300 poses", "@manhattan:poses=300"), planar)]
     return [ellipse, (DataSet("sphere, 900 poses", "@sphere:turns=30,poses_per_turn=30,radius=30", LOGARITHM), "range=8,angle=0.6"),
             (DataSet("manhattan, 2000 poses", "@manhattan:poses=2000"), planar),
-            *((one, planar) for one in compact_sets_named(["manhattanOlson3500"], data, quick))]
+            *((one, planar) for one in compact_sets_named(["manhattanOlson3500_isam"], data, quick))]
 
 
 def live_sets(data: Path | None, quick: bool) -> list[tuple[DataSet, list[str]]]:
@@ -222,7 +228,7 @@ def live_sets(data: Path | None, quick: bool) -> list[tuple[DataSet, list[str]]]
                         f"loop_noise={noisier}"), ["--range", "5", "--angle", "0.5"])
     if quick:
         return [circle("2.5", 5)]
-    recordings = [*compact_sets_named(["kitti_00", "manhattanOlson3500", "parking-garage"], data, quick),
+    recordings = [*compact_sets_named(["kitti_00", "manhattanOlson3500_isam", "parking-garage"], data, quick),
                   *located([DataSet("FR079", "pose2d/FR079.g2o", truth="de_facto"),
                             DataSet("killian5489", "pose2d/killian5489_glc.g2o", truth="de_facto")], data)]
     return [circle(noisier, 25) for noisier in ["0.5", "1", "1.5", "2.5", "5"]] + [(one, []) for one in recordings]
@@ -243,7 +249,7 @@ def thesis_sets(data: Path | None, quick: bool) -> list[DataSet]:
 
 
 def space_sets(data: Path | None, quick: bool) -> list[DataSet]:
-    return located_or([DataSet("sphere2500", "pose3d/sphere2500_isam.txt", LOGARITHM),
+    return located_or([DataSet("sphere2500_isam", "pose3d/sphere2500_isam.txt", LOGARITHM),
                        DataSet("parking-garage", "pose3d/parking-garage.g2o", LIKE_G2O),
                        DataSet("eecs", "pose3d/eecs_glc.g2o", LIKE_G2O),
                        DataSet("duderstadt", "pose3d/duderstadt_glc.g2o", LIKE_G2O)], data, quick,
@@ -255,7 +261,7 @@ def large_sets(data: Path | None, quick: bool) -> list[DataSet]:
 
 
 def sparsify_online_sets(data: Path | None, quick: bool) -> list[DataSet]:
-    return located_or([DataSet("manhattanOlson3500", "pose2d/manhattanOlson3500_isam.txt"), _CITY], data, quick, SMALL_PLANE,
+    return located_or([DataSet("manhattanOlson3500_isam", "pose2d/manhattanOlson3500_isam.txt"), _CITY], data, quick, SMALL_PLANE,
                       PLANE)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...study import Study
-from . import checks, figures, growth, million, seeds, sensitivity, sets
+from . import checks, every, figures, growth, million, seeds, sensitivity, sets
 
 STUDIES: list[Study] = [*sets.STUDIES, *sensitivity.STUDIES, *figures.STUDIES, *growth.STUDIES, *checks.STUDIES,
-                        *million.STUDIES, *seeds.STUDIES]
+                        *million.STUDIES, *seeds.STUDIES, *every.STUDIES]

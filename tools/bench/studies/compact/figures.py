@@ -42,7 +42,7 @@ def draw_set(bench: Bench, plain: DataSet) -> Json:
 
 
 def study_figures(bench: Bench, keep: Keep) -> None:
-    sets = compact_sets_named(["ellipse3d", "parking-garage", "manhattanOlson3500"], bench.data, bench.quick)
+    sets = compact_sets_named(["ellipse3d", "parking-garage", "manhattanOlson3500_isam"], bench.data, bench.quick)
     for_each_set("compact, figures", sets, lambda data: keep(draw_set(bench, data)))
     sets = compact_sets_named(["ellipse3d" if bench.quick else "kitti_00, simulated"], bench.data, bench.quick)
     for_each_set("compact, recovered paths", sets, lambda data: keep(draw_recoveries(bench, data)))

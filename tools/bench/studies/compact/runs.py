@@ -17,7 +17,7 @@ from ...rounds import Contestant
 from ...study import Bench
 from ...words import percent, times
 
-AS_PUBLISHED = "compact_pose:wide=false"  # Algorithm 1 of the paper, with candidates by equation 18 alone
+AS_PUBLISHED = "compact_pose:wide=false,noise_scale=1"  # Algorithm 1 of the paper, with candidates by equation 18 alone
 # Policy of APAL: no pair of poses is tested for being near (s = 0), so that every loop closure of a recording is found.
 ALL_LOOPS = "compact_pose:search=recorded"
 

@@ -9,7 +9,7 @@ from ...reports import Json, number, text
 from ...study import Bench, Keep, Study
 from ...words import digits, percent, whole
 from .runs import all_floors, end_of, floor_of, mean_of, measure, measured, problem_of, runs_of
-from .thesis import action_space
+from .thesis import MOST_RUNS_BEYOND, action_space
 
 
 def study_exact(bench: Bench, keep: Keep) -> None:
@@ -27,10 +27,12 @@ def study_sensitivity(bench: Bench, keep: Keep) -> None:
         "aperture 270°": action_space(bench, fov=270), "range 4 m": action_space(bench, reach=4),
         "range 16 m": action_space(bench, reach=16),
         "cells of 0.05 m": [*action_space(bench), "--mapper", "log_odds:resolution=0.05"],
-        "cells of 0.2 m": [*action_space(bench), "--mapper", "log_odds:resolution=0.2"]}
+        "cells of 0.2 m": [*action_space(bench), "--mapper", "log_odds:resolution=0.2"],
+        "evidence of a hit 0.9": [*action_space(bench), "--mapper", "log_odds:hit=0.9"]}
     for change, settings in changes.items():
         for method in ["frontier", "drrt_star"]:
-            entry = measure(bench, "sensitivity", floor_of(bench, "fr079", "@rooms"), method, method, bench.rounds, settings)
+            entry = measure(bench, "sensitivity", floor_of(bench, "fr079", "@rooms"), method, method,
+                            min(bench.rounds, MOST_RUNS_BEYOND), settings)
             keep({**entry, "change": change})
 
 

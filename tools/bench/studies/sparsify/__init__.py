@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from ...study import Study
-from . import edges, problems, thesis, whole
+from . import edges, every, problems, thesis, whole
 
-STUDIES: list[Study] = [*thesis.STUDIES, *problems.STUDIES, *whole.STUDIES, *edges.STUDIES]
+STUDIES: list[Study] = [*thesis.STUDIES, *problems.STUDIES, *whole.STUDIES, *every.STUDIES, *edges.STUDIES]
