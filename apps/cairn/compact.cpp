@@ -233,13 +233,15 @@ Job prepare(const CompactOptions& options, const Recording& recording, Session& 
   return result;
 }
 
-/// Thresholds for another run: for one that is not `whole` they are found with its errors in mind.
+/// Thresholds for another run, which need not be `whole`: where they were found by the rule alone,
+/// they are found again with the errors of such a run in mind.
 SavedThresholds thresholds_to_save(const CompactOptions& options, const Job& job,
                                    const Compaction& made, const UsedThresholds& used,
                                    const PolicySetting& setting) {
   SavedThresholds saved{.options = used.options,
                         .poses = job.given.empty() ? sample_of(job, made) : 0};
-  if (made.strategy != kWholeStrategy || made.found.options.empty()) return saved;
+  if (made.found.options.empty() || !made.found.trials.empty() || options.error_ratio <= 0.0)
+    return saved;
   PolicyJob other{.policy = parse_component(options.policy), .registration = options.registration};
   other.policy.values = job.given;
   const FoundThresholds found =
@@ -376,6 +378,7 @@ int run_compact(const CompactOptions& options, Session& session) {
     session.note("interrupted before anything was selected");
     return kExitInterrupted;
   }
+  if (options.strategy == "rfpfl") made.strategy = options.strategy;
   const std::string& policy = made.job.policy.name;
   const UsedThresholds thresholds = used_thresholds(
       job.given, made.found.options.empty() ? job.compaction.thresholds : made.found.options,

@@ -219,6 +219,7 @@ TEST_F(Compact, KeepsEverythingThatTheStrategySaysSo) {
 TEST_F(Compact, TheControlHasTheSizeOfWhatItIsComparedWith) {
   const boost::json::value control =
       study({kWorld, "--strategy", "rfpfl", "--range", "5", "--angle", "3", "--seed", "3"});
+  EXPECT_EQ(control.at("strategy").as_string(), "rfpfl");
   EXPECT_EQ(whole(control, "poses", "kept"), whole(control.at("like"), "poses", "kept"));
   EXPECT_EQ(whole(control, "loops", "kept"), whole(control.at("like"), "loops", "kept"));
   EXPECT_NE(ate(control, "v2"), ate(control.at("like"), "v2"));

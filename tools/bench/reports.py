@@ -64,3 +64,8 @@ def paired_ratio(peer: Json, mine: Json) -> float:
 def was_late(contestant: Json) -> bool:
     """Whether one run took too long."""
     return member(contestant, "in_time") is False
+
+
+def why_none(entry: Json, limit: float) -> str:
+    """Of a run without a report: "> 600 s", or "refused (code 3)"."""
+    return f"> {limit:.0f} s" if member(entry, "in_time") is False else f"refused (code {number(entry, 'code'):.0f})"

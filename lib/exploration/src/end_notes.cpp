@@ -52,7 +52,9 @@ std::string unfinished(const ExplorationResult& result, const RunFacts& facts) {
   const double seen = result.against->reachable_seen.value_or(1.0);
   if (seen >= kNearlyAll) return {};
   return fmt::format(
-      "nothing was left that it could reach, but it has seen {:.0f} % of what its body could cover",
+      "nothing was left that it could reach, but it has seen {:.0f} % of what its body could "
+      "cover; "
+      "smaller cells of the map, such as log_odds:resolution=0.05, leave narrow gaps open",
       100.0 * seen);
 }
 

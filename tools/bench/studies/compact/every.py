@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...data_sets import DataSet, every_graph
 from ...pages import Sections, table
-from ...reports import Json, number, text
+from ...reports import Json, member, number, text, why_none
 from ...study import Bench, Keep, Study, tell
 from ...words import digits, percent, whole
 
@@ -16,7 +16,7 @@ def measure_strategy(bench: Bench, data: DataSet, strategy: list[str]) -> Json:
     names = ["status", "strategy", "poses", "loops", "landmarks", "check", "whole"]
     found = {name: run.report.get(name) for name in names} if run.report else {}
     return {**found, "left_out": len(run.report["left_out"]) if run.report else 0, "seconds": run.outcome.seconds,
-            "complaint": "" if run.report else run.outcome.complaint.replace(data.graph, data.name)}
+            "code": run.outcome.exit_code, "in_time": run.outcome.in_time}
 
 
 def study_every(bench: Bench, keep: Keep) -> None:
@@ -40,8 +40,8 @@ def sections(entries: list[Json]) -> Sections:
     rows = []
     for entry in entries:
         name, ours, robot = text(entry, "name"), entry["default"], entry["fpfl"]
-        if complaint := text(ours, "complaint"):
-            rows.append([name, complaint, *[""] * 10])
+        if not member(ours, "status"):
+            rows.append([name, why_none(ours, LIMIT), *[""] * 10])
             continue
         factors = [number(ours, f"whole.factors.{of}") for of in ["out", "in"]]
         rows.append([name, text(ours, "strategy"), kept(ours, "poses"), f"{whole(factors[0])} of {whole(factors[1])}",

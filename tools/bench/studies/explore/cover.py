@@ -33,7 +33,7 @@ SETTINGS = [Setting(floor, view, motion) for floor in FLOORS for view in VIEWS f
 
 
 def third_of(explorer: str) -> list[Setting]:
-    """Drawn at random, the same each time: docs/explore_results.md says how many of each kind. `./dev bench` keeps the list."""
+    """Drawn at random, the same each time; the report has the list."""
     return sorted(random.Random(explorer).sample(SETTINGS, len(SETTINGS) // 3), key=SETTINGS.index)
 
 

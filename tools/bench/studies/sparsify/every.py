@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...data_sets import every_graph
 from ...pages import Sections, table
-from ...reports import Json, number, text
+from ...reports import Json, member, number, text, why_none
 from ...study import Bench, Keep, Study, tell
 from ...words import digits, whole
 from .runs import LIMIT
@@ -16,15 +16,14 @@ def study_every(bench: Bench, keep: Keep) -> None:
         run = bench.cairn.on("sparsify", data, [], 1, LIMIT)
         names = ["status", "poses", "factors", "problems", "kld", "kld_parts", "rmse_aligned"]
         found = {name: run.report.get(name) for name in names} if run.report else {}
-        keep({"name": data.name, **found, "seconds": run.outcome.seconds, "code": run.outcome.exit_code,
-              "complaint": "" if run.report else run.outcome.complaint.replace(data.graph, data.name)})
+        keep({"name": data.name, **found, "seconds": run.outcome.seconds, "code": run.outcome.exit_code, "in_time": run.outcome.in_time})
 
 
 def sections(entries: list[Json]) -> Sections:
     rows = []
     for entry in entries:
-        if complaint := text(entry, "complaint"):
-            rows.append([text(entry, "name"), *[""] * 7, f"{complaint} (code {number(entry, 'code'):.0f})"])
+        if not member(entry, "status"):
+            rows.append([text(entry, "name"), *[""] * 7, why_none(entry, LIMIT)])
             continue
         rows.append([text(entry, "name"), f"{whole(number(entry, 'poses.kept'))} of {whole(number(entry, 'poses.in'))}",
                      f"{whole(number(entry, 'factors.out'))} of {whole(number(entry, 'factors.in'))}",

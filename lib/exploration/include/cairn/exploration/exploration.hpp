@@ -83,7 +83,7 @@ struct ExplorationResult {
   /// Of all poses, in the frame of the world; without variables if it is not known.
   Graph truth_trajectory;
   FloorMap map;
-  /// That the covariances predict (`cairn::expected_ate`) [m].
+  /// Absolute trajectory error that the covariances predict (`cairn::expected_ate`) [m].
   double expected_ate = 0.0;
   double map_error = 0.0;           ///< `contradicted_area` [m²]
   std::optional<MapTruth> against;  ///< beside the floor, where that is known
