@@ -15,7 +15,7 @@
 
 #include "cairn/geometry/motion.hpp"
 #include "cairn/geometry/pose_chain.hpp"
-#include "cairn/online/pose_remover.hpp"
+#include "cairn/update/pose_remover.hpp"
 #include "cairn/policy/pose_policy.hpp"
 #include "cairn/solve/estimator.hpp"
 #include "pose_index.hpp"

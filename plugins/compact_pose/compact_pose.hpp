@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "absolute.hpp"
-#include "cairn/online/pose_remover.hpp"
+#include "cairn/update/pose_remover.hpp"
 #include "cairn/policy/pose_policy.hpp"
 #include "compact_graph.hpp"
 #include "compact_pose_options.hpp"

@@ -28,9 +28,8 @@ const Names kLayers{"runtime", "types", "graph", "linear", "solve", "plugin"};
 /// Libraries beside plugins, which plugins (and libraries) may include.
 const Names kShared{"solvers/block", "solvers/linear/blas", "solvers/linear/iterative",
                     "solvers/nonlinear/descent"};
-/// Eigen's decompositions, compiled once, and memory for arrays: what everything may include, and
-/// includes nothing.
-const Names kBelow{"lib/dense/", "lib/memory/", "lib/pack/", "lib/text/"};
+/// Below the core: what everything may include, and includes nothing of cairn.
+const Names kBelow{"core/numeric/"};
 /// Of what lies below the core, the folders of public headers: several numbers at a time, arrays.
 const Names kPublicBelow{"pack", "memory", "text"};
 /// Folders each of whose folders stands for itself: it includes no other.
@@ -125,7 +124,8 @@ class Tree {
   /// The layer or subject that a file of core or lib belongs to; empty elsewhere.
   std::string part_of(const std::string& file) const {
     const std::string core_headers = "core/include/cairn/", core_sources = "core/src/";
-    for (const std::string& begin : {core_headers, core_sources, std::string("lib/")}) {
+    for (const std::string& begin :
+         {core_headers, core_sources, kBelow.front(), std::string("lib/")}) {
       if (file.starts_with(begin))
         return file.substr(begin.size(), file.find('/', begin.size()) - begin.size());
     }
@@ -235,8 +235,8 @@ TEST_F(FaultyTree, WhatIsAllowedIsNoFault) {
   write("solvers/linear/one/one.cpp", "#include \"block/front.hpp\"\n#include \"one.hpp\"\n");
   write("solvers/linear/one/one.hpp", "#include \"cairn/update/u.hpp\"\n");
   write("solvers/linear/two/one.hpp", "");
-  write("lib/dense/lu.hpp", "#include \"dense/products.hpp\"\n");
-  write("lib/dense/products.hpp", "#include <Eigen/Core>\n");
+  write("core/numeric/dense/lu.hpp", "#include \"dense/products.hpp\"\n");
+  write("core/numeric/dense/products.hpp", "#include <Eigen/Core>\n");
   for (const char* file : {"core/src/graph/lu.cpp", "lib/update/src/lu.cpp", "types/one/lu.cpp"})
     write(file, "#include \"dense/lu.hpp\"\n");
   EXPECT_THAT(faults(), IsEmpty());
@@ -250,18 +250,19 @@ TEST_F(FaultyTree, ALaterLayerOrSubjectIsAFault) {
 }
 
 TEST_F(FaultyTree, ALayerInWhatLiesBelowTheCoreIsAFault) {
-  write("lib/dense/lu.hpp", "#include \"cairn/runtime/error.hpp\"\n");
-  write("lib/memory/aligned_memory.hpp", "#include \"cairn/runtime/error.hpp\"\n");
+  write("core/numeric/dense/lu.hpp", "#include \"cairn/runtime/error.hpp\"\n");
+  write("core/numeric/memory/aligned_memory.hpp", "#include \"cairn/runtime/error.hpp\"\n");
   EXPECT_THAT(faults(), ElementsAre(HasSubstr("below the core"), HasSubstr("below the core")));
 }
 
 TEST_F(FaultyTree, PacksMayBeIncludedEverywhereAndIncludeNothingElse) {
   write("core/include/cairn/types/t.hpp", "#include \"cairn/pack/pack.hpp\"\n");
-  write("lib/pack/include/cairn/pack/p.hpp", "#include \"cairn/pack/pack.hpp\"\n");
+  write("core/numeric/pack/include/cairn/pack/p.hpp", "#include \"cairn/pack/pack.hpp\"\n");
   EXPECT_THAT(faults(), IsEmpty());
-  write("lib/pack/include/cairn/pack/p.hpp", "#include \"cairn/types/t.hpp\"\n");
+  write("core/numeric/pack/include/cairn/pack/p.hpp", "#include \"cairn/types/t.hpp\"\n");
   EXPECT_THAT(faults(), ElementsAre(HasSubstr("below the core")));
-  write("lib/pack/include/cairn/pack/p.hpp", "#include \"cairn/memory/growing_array.hpp\"\n");
+  write("core/numeric/pack/include/cairn/pack/p.hpp",
+        "#include \"cairn/memory/growing_array.hpp\"\n");
   EXPECT_THAT(faults(), ElementsAre(HasSubstr("each stands for itself")));
 }
 

@@ -14,7 +14,7 @@
 #include "cairn/geometry/pose.hpp"
 #include "cairn/geometry/pose_chain.hpp"
 #include "cairn/graph/gauge.hpp"
-#include "cairn/online/recorded_graph.hpp"
+#include "cairn/update/recorded_graph.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/timed.hpp"

@@ -17,7 +17,7 @@
 #include <fmt/core.h>
 
 #include "cairn/io/format.hpp"
-#include "cairn/online/recorded_graph.hpp"
+#include "cairn/update/recorded_graph.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "cairn/solve/estimator.hpp"

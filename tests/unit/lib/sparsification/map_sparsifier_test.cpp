@@ -17,7 +17,7 @@
 
 #include "cairn/io/generator.hpp"
 #include "cairn/lie/se2.hpp"
-#include "cairn/online/recorded_graph.hpp"
+#include "cairn/update/recorded_graph.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/solve/optimizer.hpp"

@@ -14,7 +14,7 @@
 #include <boost/math/distributions/normal.hpp>
 
 #include "cairn/geometry/pose_chain.hpp"
-#include "cairn/online/recorded_graph.hpp"
+#include "cairn/update/recorded_graph.hpp"
 #include "cairn/policy/registration.hpp"
 #include "cairn/solve/estimator.hpp"
 #include "support/pose_world.hpp"

@@ -7,7 +7,7 @@
 
 #include "cairn/graph/graph.hpp"
 #include "cairn/linear/linear_solver.hpp"
-#include "cairn/online/recorded_graph.hpp"
+#include "cairn/update/recorded_graph.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/api.hpp"
 #include "cairn/solve/estimator.hpp"

@@ -11,7 +11,7 @@
 
 #include "cairn/geometry/motion.hpp"
 #include "cairn/geometry/pose_chain.hpp"
-#include "cairn/online/recorded_graph.hpp"
+#include "cairn/update/recorded_graph.hpp"
 #include "cairn/plugin/options.hpp"
 #include "cairn/policy/registration.hpp"
 #include "cairn/runtime/component.hpp"

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "cairn/graph/graph.hpp"
-#include "cairn/online/pose_remover.hpp"
+#include "cairn/update/pose_remover.hpp"
 #include "cairn/plugin/options.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/api.hpp"

@@ -16,7 +16,7 @@
 #include "../random_sequence.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/io/generator.hpp"
-#include "cairn/online/recorded_graph.hpp"
+#include "cairn/update/recorded_graph.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/solve/estimator.hpp"

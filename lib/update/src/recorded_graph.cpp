@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/online/recorded_graph.hpp"
+#include "cairn/update/recorded_graph.hpp"
 
 #include <algorithm>
 #include <cstddef>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/online/pose_remover.hpp"
+#include "cairn/update/pose_remover.hpp"
 
 namespace cairn {
 
