@@ -17,7 +17,6 @@
 #include <boost/json/parse.hpp>
 #include <boost/json/serialize.hpp>
 
-#include "arguments.hpp"
 #include "cairn/exploration/recording.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/report/recording.hpp"
@@ -171,23 +170,25 @@ bool has_columns(const std::string& file) {
   return std::filesystem::is_regular_file(file, error) && is_exploration_recording(read_file(file));
 }
 
-void add_album_options(ArgumentParser cli, AlbumOptions& options, const char* files) {
-  cli.add_option("files", options.files, files)
-      .type_name("FILE")
-      .file_or_generated({"generator"})
-      .required();
-  cli.add_option("--name", options.names, "what to call the first FILE, the second … [its name]")
-      .type_name("TEXT")
-      .repeatable();
-  cli.add_option("--truth", options.truth,
-                 "the ground truth, by id; estimates are aligned as by evaluate")
-      .type_name("FILE");
-  add_axes_option(cli, options.axes,
-                  "of trajectories, shown as a robot's: robot, camera [camera for KITTI]");
-  cli.add_option("--initial", options.initial, "initial estimate to show too: kind initial_guess")
-      .component({"initial_guess"});
-  cli.add_option("--title", options.title, "title [name of the first FILE]").type_name("TEXT");
-  add_input_options(cli, options.input);
+OptionFields<AlbumOptions> AlbumOptions::fields(const char* what) {
+  using O = AlbumOptions;
+  return OptionFields<O>()
+      .text("files", &O::files, what)
+      .positional()
+      .placeholder("FILE")
+      .or_generated_by({"generator"})
+      .required()
+      .text("name", &O::names, "what to call the first FILE, the second … [its name]")
+      .text("truth", &O::truth, "the ground truth, by id; estimates are aligned as by evaluate")
+      .placeholder("FILE")
+      .choice("axes", &O::axes, {"robot", "camera"},
+              "of trajectories, shown as a robot's: robot, camera [camera for KITTI]")
+      .placeholder("AXES")
+      .optional()
+      .component("initial", &O::initial, {"initial_guess"},
+                 "initial estimate to show too: kind initial_guess")
+      .text("title", &O::title, "title [name of the first FILE]")
+      .part(&O::input);
 }
 
 Album begin_album(const std::string& title, const std::string& command) {

@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "arguments.hpp"
 #include "cairn/report/album_builder.hpp"
 #include "cairn/report/scene.hpp"
 #include "graph_files.hpp"
@@ -25,6 +24,9 @@ struct AlbumOptions {
   bool apart = false;   ///< each graph by itself, also one with the ids of another
   bool curves = false;  ///< of recordings of explorations the curves alone, as tables
   bool maps = false;    ///< recordings of explorations whole, also with `curves`
+
+  /// Of commands that show them; `what` says what FILE may be.
+  static OptionFields<AlbumOptions> fields(const char* what);
 };
 
 /// Of a recording of an exploration [bytes], so that a page is below 15 MB.
@@ -34,8 +36,6 @@ inline constexpr std::size_t kMostOfAPage = 13'000'000;
 bool is_csv(const std::string& file);
 /// Whether it has columns to plot: as `is_csv`, or a recording of an exploration.
 bool has_columns(const std::string& file);
-/// `files`: what FILE may be.
-void add_album_options(ArgumentParser cli, AlbumOptions& options, const char* files);
 
 /// Reads the files (graphs, trajectories, recordings, the JSON of runs, CSV) and lays together what
 /// belongs together, as `AlbumBuilder` does. Throws `Error` for files that cannot be read.

@@ -7,7 +7,6 @@
 #include <boost/json/object.hpp>
 
 #include "album.hpp"
-#include "arguments.hpp"
 #include "bench_report.hpp"
 #include "bench_run.hpp"
 #include "cairn/plugin/registry.hpp"
@@ -137,41 +136,9 @@ int run(const BenchOptions& options, Session& session) {
 
 }  // namespace
 
-Command add_bench(ArgumentParser program) {
-  auto options = std::make_shared<BenchOptions>();  // lives as long as the parser and the run
-  ArgumentParser cli =
-      program.add_command("bench", "solvers side by side: medians, ratios, agreement");
-  cli.add_option("graphs", options->graphs, kGraphHelp)
-      .type_name("GRAPH")
-      .file_or_generated({"generator"})
-      .required();
-  cli.add_option("--name", options->names, "what to call the first GRAPH, the second … [its name]")
-      .type_name("TEXT")
-      .repeatable();
-  cli.add_option("--optimizer", options->optimizers,
-                 "optimizers A,B,… with options as NAME:key=value")
-      .components({"optimizer"})
-      .repeatable()
-      .show_default(kDefaultOptimizer);
-  cli.add_option("--linear-solver", options->linear_solvers,
-                 "linear solvers A,B,… for each of them")
-      .components({"linear_solver"})
-      .repeatable()
-      .show_default("all direct ones on offer");
-  add_problem_options(cli, options->problem);
-  add_time_limit(cli, options->problem.stop);
-  cli.add_option("--repeat", options->repeat, "rounds; in each, every solver runs once")
-      .type_name("N")
-      .within(1, 1000000)
-      .show_default();
-  cli.add_flag("--no-memory", options->no_memory, "leave out the extra run for the peak memory");
-  cli.add_option("--csv", options->csv, "one line per run (- is standard output)")
-      .type_name("FILE");
-  add_latex_option(cli, options->latex);
-  cli.add_option("--html", options->html, "all of it as an HTML report with the graphs")
-      .type_name("FILE");
-  add_input_options(cli, options->input);
-  cli.footer(
+Command bench_command() {
+  return make_command<BenchOptions>(
+      "bench", "solvers side by side: medians, ratios, agreement",
       "Every run starts from the same initial estimate and ends as optimize does; for N equal "
       "steps, "
       "add\n"
@@ -182,8 +149,8 @@ Command add_bench(ArgumentParser program) {
       "and optimises once, as cairn optimize.\n\n"
       "Example:\n"
       "  cairn bench sphere.g2o @manhattan:poses=3500 --optimizer levenberg_marquardt,ceres --csv "
-      "runs.csv");
-  return {cli, [options](Session& session) { return run(*options, session); }};
+      "runs.csv",
+      run);
 }
 
 }  // namespace cairn::app

@@ -7,6 +7,7 @@
 
 #include "cairn/plugin/registry.hpp"
 #include "graph_files.hpp"
+#include "latex_table.hpp"
 #include "problem_setup.hpp"
 
 namespace cairn::app {
@@ -23,6 +24,32 @@ struct BenchOptions {
   std::string csv;
   std::string latex;
   std::string html;
+
+  static auto fields() {
+    using O = BenchOptions;
+    return OptionFields<O>()
+        .text("graphs", &O::graphs, kGraphHelp)
+        .positional()
+        .placeholder("GRAPH")
+        .or_generated_by({"generator"})
+        .required()
+        .text("name", &O::names, "what to call the first GRAPH, the second … [its name]")
+        .components("optimizer", &O::optimizers, {"optimizer"},
+                    "optimizers A,B,… with options as NAME:key=value [levenberg_marquardt]")
+        .components("linear_solver", &O::linear_solvers, {"linear_solver"},
+                    "linear solvers A,B,… for each of them [all direct ones on offer]")
+        .part(&O::problem)
+        .part(&O::problem, ProblemOptions::limit_fields())
+        .integer("repeat", &O::repeat, 1, 1e6, "rounds; in each, every solver runs once")
+        .boolean("no_memory", &O::no_memory, "leave out the extra run for the peak memory")
+        .text("csv", &O::csv, "one line per run (- is standard output)")
+        .placeholder("FILE")
+        .text("latex", &O::latex, kLatexHelp)
+        .placeholder("FILE")
+        .text("html", &O::html, "all of it as an HTML report with the graphs")
+        .placeholder("FILE")
+        .part(&O::input);
+  }
 };
 
 /// One configuration: an optimizer and, where it takes one, a linear solver; as they were written.

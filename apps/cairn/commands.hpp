@@ -1,38 +1,31 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <functional>
+#include <vector>
 
-#include "arguments.hpp"
-#include "session.hpp"
+#include "command.hpp"
 
 namespace cairn::app {
 
-/// A subcommand: what the command line parser knows of it, and what it does once its options stand.
-/// `run` returns the program's exit code, or throws `Error`.
-struct Command {
-  ArgumentParser parser;
-  std::function<int(Session&)> run;
-};
-
-// One file each. Adds the subcommand with its options to the program.
-Command add_plugins(ArgumentParser program);
-Command add_new_plugin(ArgumentParser program);
-Command add_info(ArgumentParser program);
-Command add_convert(ArgumentParser program);
-Command add_generate(ArgumentParser program);
-Command add_optimize(ArgumentParser program);
-Command add_bench(ArgumentParser program);
-Command add_replay(ArgumentParser program);
-Command add_online(ArgumentParser program);
-Command add_marginals(ArgumentParser program);
-Command add_compact(ArgumentParser program);
-Command add_sparsify(ArgumentParser program);
-Command add_explore(ArgumentParser program);
-Command add_map(ArgumentParser program);
-Command add_study(ArgumentParser program);
-Command add_evaluate(ArgumentParser program);
-Command add_view(ArgumentParser program);
-Command add_plot(ArgumentParser program);
+// One file each.
+Command plugins_command();
+Command new_plugin_command();
+Command info_command();
+Command convert_command();
+Command generate_command();
+Command optimize_command();
+Command bench_command();
+Command replay_command();
+Command online_command();
+Command marginals_command();
+Command compact_command();
+Command sparsify_command();
+Command explore_command();
+Command map_command();
+Command evaluate_command();
+Command view_command();
+Command plot_command();
+/// `study` and the commands that it has.
+std::vector<Command> study_commands();
 
 }  // namespace cairn::app

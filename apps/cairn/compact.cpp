@@ -12,7 +12,6 @@
 #include <fmt/core.h>
 #include <boost/json/object.hpp>
 
-#include "arguments.hpp"
 #include "cairn/evaluation/plausibility.hpp"
 #include "cairn/geometry/pose.hpp"
 #include "cairn/io/losses_not_written.hpp"
@@ -457,89 +456,88 @@ int run_compact(const CompactOptions& options, Session& session) {
   return static_cast<int>(ErrorCode::numerical);
 }
 
-void add_compact_options(ArgumentParser cli, CompactOptions& options,
-                         std::vector<std::string> strategies) {
-  cli.add_option("graph", options.graph, kGraphHelp)
-      .type_name("GRAPH")
-      .file_or_generated({"generator"})
-      .required();
-  cli.add_option("-o,--output", options.output, "write the compact graph").type_name("OUT");
-  cli.add_option("--to", options.output_format, "format of OUT")
-      .component({"format"})
-      .type_name("FORMAT");
-  cli.add_option("--trajectory", options.trajectory, "write all poses, those left out put back")
-      .type_name("FILE");
-  cli.add_option("--map", options.map,
-                 "continue this map of an earlier session; where on it is unknown at first")
-      .type_name("MAP");
-  cli.add_option("--begin", options.begin,
-                 "begin at the pose with this id; those before are of earlier sessions")
-      .type_name("ID");
-  cli.add_option(
-         "--recovery", options.recovery,
-         "put back what was left out: v0 evenly, v1 by distance, v2 along odometry, or likely")
-      .type_name("HOW")
-      .one_of({"v0", "v1", "v2", "likely"})
-      .show_default();
-  cli.add_option("--strategy", options.strategy,
-                 "few poses with all measurements (whole), or as a robot drives, all or few poses "
-                 "and loops: apal, apfl, fpfl [whole; fpfl with --map or another "
-                 "registration]")
-      .type_name("NAME")
-      .one_of(std::move(strategies));
-  cli.add_option("--policy", options.policy, "the pose policy, with options as NAME:key=value")
-      .component({"pose_policy"})
-      .show_default();
-  cli.add_option("--estimator", options.estimator, "the estimator, instead of the policy's own")
-      .component({"estimator"});
-  cli.add_option("--registration", options.registration,
+OptionFields<CompactOptions> CompactOptions::fields(std::vector<std::string> strategies,
+                                                    std::string_view help) {
+  using O = CompactOptions;
+  constexpr double kAny = std::numeric_limits<double>::infinity();
+  return OptionFields<O>()
+      .text("graph", &O::graph, kGraphHelp)
+      .positional()
+      .placeholder("GRAPH")
+      .or_generated_by({"generator"})
+      .required()
+      .text("output", &O::output, "write the compact graph")
+      .letter('o')
+      .placeholder("OUT")
+      .component("to", &O::output_format, {"format"}, "format of OUT")
+      .placeholder("FORMAT")
+      .text("trajectory", &O::trajectory, "write all poses, those left out put back")
+      .placeholder("FILE")
+      .text("map", &O::map,
+            "continue this map of an earlier session; where on it is unknown at first")
+      .placeholder("MAP")
+      .integer("begin", &O::begin, static_cast<double>(std::numeric_limits<Id>::min()),
+               static_cast<double>(std::numeric_limits<Id>::max()),
+               "begin at the pose with this id; those before are of earlier sessions")
+      .placeholder("ID")
+      .choice("recovery", &O::recovery, {"v0", "v1", "v2", "likely"},
+              "put back what was left out: v0 evenly, v1 by distance, v2 along odometry, or likely")
+      .placeholder("HOW")
+      .choice("strategy", &O::strategy, std::move(strategies), help)
+      .placeholder("NAME")
+      .optional()
+      .component("policy", &O::policy, {"pose_policy"},
+                 "the pose policy, with options as NAME:key=value")
+      .component("estimator", &O::estimator, {"estimator"},
+                 "the estimator, instead of the policy's own")
+      .component("registration", &O::registration, {"registration"},
                  "matcher: recorded, or simulated:range=5,angle=1,false_rate=0.1")
-      .component({"registration"})
-      .show_default();
-  cli.add_flag("--auto", options.automatic,
-               "find those thresholds in a sample that are not given; the default if none are");
-  cli.add_option("--sample", options.sample, "part of the poses that is the sample")
-      .type_name("PART")
-      .within(0.0, 1.0)
-      .show_default();
-  cli.add_option("--thresholds", options.thresholds, "take thresholds from a file")
-      .type_name("FILE");
-  cli.add_option("--save-thresholds", options.save_thresholds,
-                 "write those given and found to a file")
-      .type_name("FILE");
-  cli.add_option("--range", options.range, "how far the sensor matches [m]").type_name("M");
-  cli.add_option("--angle", options.angle, "and between which orientations [rad]").type_name("RAD");
-  cli.add_option("--loop-gain", options.loop_gain,
-                 "information gain that a loop closure must exceed [nats]")
-      .type_name("G");
-  cli.add_option("--pose-gain", options.pose_gain,
-                 "a pose is kept if every link to one nearby would gain more [nats]")
-      .type_name("G");
-  cli.add_option("--gate", options.gate,
-                 "reject loop closures beyond the chi-square quantile P of their innovation (0.99)")
-      .type_name("P");
-  cli.add_option("--keep", options.keep,
-                 "keep so many poses at most: others leave, and are replaced by factors; 0: all")
-      .type_name("N")
-      .none_or_within(2, 1000000000)
-      .show_default();
-  cli.add_option("--truth", options.truth, "true poses, for errors").type_name("FILE");
-  cli.add_option("--steps", options.steps, "a row for each pose, as CSV").type_name("FILE");
-  add_loss_options(cli, options.problem);
-  add_input_options(cli, options.input);
+      .boolean("auto", &O::automatic,
+               "find those thresholds in a sample that are not given; the default if none are")
+      .real("sample", &O::sample, 0.0, 1.0, "part of the poses that is the sample")
+      .placeholder("PART")
+      .text("thresholds", &O::thresholds, "take thresholds from a file")
+      .placeholder("FILE")
+      .text("save_thresholds", &O::save_thresholds, "write those given and found to a file")
+      .placeholder("FILE")
+      .real("range", &O::range, -kAny, kAny, "how far the sensor matches [m]")
+      .placeholder("M")
+      .real("angle", &O::angle, -kAny, kAny, "and between which orientations [rad]")
+      .placeholder("RAD")
+      .real("loop_gain", &O::loop_gain, -kAny, kAny,
+            "information gain that a loop closure must exceed [nats]")
+      .placeholder("G")
+      .real("pose_gain", &O::pose_gain, -kAny, kAny,
+            "a pose is kept if every link to one nearby would gain more [nats]")
+      .placeholder("G")
+      .real("gate", &O::gate, -kAny, kAny,
+            "reject loop closures beyond the chi-square quantile P of their innovation (0.99)")
+      .placeholder("P")
+      .integer("keep", &O::keep, 2, 1e9,
+               "keep so many poses at most: others leave, and are replaced by factors; 0: all")
+      .or_zero()
+      .text("truth", &O::truth, "true poses, for errors")
+      .placeholder("FILE")
+      .text("steps", &O::steps, "a row for each pose, as CSV")
+      .placeholder("FILE")
+      .part(&O::problem, ProblemOptions::loss_fields())
+      .part(&O::input);
 }
 
-Command add_compact(ArgumentParser program) {
-  auto options = std::make_shared<CompactOptions>();  // lives as long as the parser and the run
-  ArgumentParser cli = program.add_command(
-      "compact", "compact pose SLAM: keep only the most informative poses and loop closures");
-  add_compact_options(cli, *options, {"whole", "apal", "apfl", "fpfl"});
-  cli.footer(
+OptionFields<CompactOptions> CompactOptions::fields() {
+  return fields({"whole", "apal", "apfl", "fpfl"},
+                "few poses with all measurements (whole), or as a robot drives, all or few poses "
+                "and loops: apal, apfl, fpfl [whole; fpfl with --map or another registration]");
+}
+
+Command compact_command() {
+  return make_command<CompactOptions>(
+      "compact", "compact pose SLAM: keep only the most informative poses and loop closures",
       "Example:\n"
       "  cairn compact my.g2o -o compact.g2o --trajectory full.g2o --json report.json\n"
       "  cairn compact tuesday.g2o --map monday.g2o -o both.g2o --thresholds robot.json\n"
-      "  cairn compact city.g2o --strategy apal --thresholds city.json --truth truth.g2o");
-  return {cli, [options](Session& session) { return run_compact(*options, session); }};
+      "  cairn compact city.g2o --strategy apal --thresholds city.json --truth truth.g2o",
+      run_compact);
 }
 
 }  // namespace cairn::app

@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "arguments.hpp"
 #include "graph_files.hpp"
 #include "problem_setup.hpp"
 #include "session.hpp"
@@ -41,11 +40,12 @@ struct CompactOptions {
   std::string compare;
 
   CompactOptions() { problem.initial.clear(); }
-};
 
-/// The options of `cairn compact`, with the strategies on offer.
-void add_compact_options(ArgumentParser cli, CompactOptions& options,
-                         std::vector<std::string> strategies);
+  static OptionFields<CompactOptions> fields();
+  /// The same where other strategies are on offer, about which `help` is.
+  static OptionFields<CompactOptions> fields(std::vector<std::string> strategies,
+                                             std::string_view help);
+};
 
 /// Returns the exit code.
 int run_compact(const CompactOptions& options, Session& session);

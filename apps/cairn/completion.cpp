@@ -3,19 +3,19 @@
 
 #include <algorithm>
 #include <array>
-#include <optional>
 #include <string_view>
 #include <utility>
 
 #include "cairn/plugin/plugin_search.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
+#include "option_parser.hpp"
 #include "table.hpp"
 
 namespace cairn::app {
 namespace {
 
-/// Type names of arguments whose value is a file.
+/// Placeholders of values that are files.
 constexpr std::array<std::string_view, 11> kFiles{
     "FILE", "GRAPH", "IN", "OUT", "MAP", "FLOOR", "LOG", "PAGE", "PICTURE", "ESTIMATE", "TRUTH"};
 
@@ -76,8 +76,8 @@ void add_options(Collector& collector, const std::string& before, const std::str
 }
 
 /// "NAME", "NAME:key=value,key=value", and in a list several of these with commas between them.
-void add_components(Collector& collector, std::size_t begin, const ValueWords& words,
-                    Registry& registry) {
+void add_components(Collector& collector, std::size_t begin, const std::vector<std::string>& kinds,
+                    bool several, Registry& registry) {
   const std::string& typed = collector.typed();
   std::string name;  // whose options may stand at `part`
   std::size_t part = begin;
@@ -91,96 +91,86 @@ void add_components(Collector& collector, std::size_t begin, const ValueWords& w
   if (colon != std::string::npos) {
     name = typed.substr(part, colon - part);
     part = colon + 1;
-  } else if (part == begin || words.list) {
-    add_names(collector, typed.substr(0, part), words.kinds, registry);
+  } else if (part == begin || several) {
+    add_names(collector, typed.substr(0, part), kinds, registry);
   }
   if (!name.empty())
-    add_options(collector, typed.substr(0, part), typed.substr(part), name, words.kinds, registry);
+    add_options(collector, typed.substr(0, part), typed.substr(part), name, kinds, registry);
 }
 
 // Arguments ---------------------------------------------------------------------------------------
 
 /// The value of an argument, which begins at `begin` of the typed word.
-void add_value(Collector& collector, std::size_t begin, const Argument& argument,
+void add_value(Collector& collector, std::size_t begin, const OptionSpec& option,
                const std::function<Registry&()>& registry) {
-  const ValueWords& words = argument.words();
   const std::string before = collector.typed().substr(0, begin);
-  for (const std::string& choice : words.choices)
-    collector.add(before + choice, argument.description());
-  if (words.component) add_components(collector, begin, words, registry());
-  if (!words.generators.empty() && collector.typed().substr(begin).starts_with('@')) {
-    ValueWords generators;
-    generators.kinds = words.generators;
-    add_components(collector, begin + 1, generators, registry());
-  } else if (std::ranges::find(kFiles, argument.type_name()) != kFiles.end()) {
+  if (option.type == OptionType::component) {
+    add_components(collector, begin, option.choices, option.components, registry());
+  } else {
+    for (const std::string& choice : option.choices) collector.add(before + choice, option.help);
+  }
+  if (!option.form.generators.empty() && collector.typed().substr(begin).starts_with('@')) {
+    add_components(collector, begin + 1, option.form.generators, false, registry());
+  } else if (std::ranges::find(kFiles, value_name(option)) != kFiles.end()) {
     collector.allow_files();
   }
-}
-
-std::vector<std::string> names_of(const Argument& option) {
-  std::vector<std::string> names;
-  for (const std::string& name : option.long_names()) names.push_back("--" + name);
-  for (const std::string& name : option.short_names()) names.push_back("-" + name);
-  return names;
 }
 
 /// What has been typed before the last word: the command that it chose, and what comes next.
 class Place {
  public:
-  explicit Place(ArgumentParser program) : program_(program), command_(program) {}
+  explicit Place(const Program& program) : program_(program), command_(&program.self) {}
 
   void pass(const std::string& word) {
     if (pending_) {
-      pending_.reset();
+      pending_ = nullptr;
     } else if (word == "--" && !only_positionals_) {
       only_positionals_ = true;
     } else if (word.size() > 1 && word.front() == '-' && !only_positionals_) {
-      const std::optional<Argument> option = find(word.substr(0, word.find('=')));
-      if (option && option->most_values() > 0 && word.find('=') == std::string::npos)
-        pending_ = option;
+      const OptionSpec* option = find(word.substr(0, word.find('=')));
+      if (option && !is_flag(*option) && word.find('=') == std::string::npos) pending_ = option;
     } else if (!descend(word)) {
       ++positionals_;
     }
   }
 
-  /// The option whose value comes next, if one does.
-  const std::optional<Argument>& pending() const { return pending_; }
+  /// The option whose value comes next, or null.
+  const OptionSpec* pending() const { return pending_; }
   bool options_may_follow() const { return !only_positionals_; }
-  const ArgumentParser& command() const { return command_; }
+  std::vector<const Command*> commands() const { return program_.below(*command_); }
 
-  /// All that may be given here, with the options of every command.
-  std::vector<Argument> options() const {
-    std::vector<Argument> all = command_.arguments();
-    for (const Argument& option :
-         command_.parent() ? program_.arguments_but_help() : std::vector<Argument>())
-      all.push_back(option);
-    std::erase_if(all, [](const Argument& option) { return names_of(option).empty(); });
+  /// All that may be given here by a name, with the options of every command.
+  std::vector<const OptionSpec*> options() const {
+    std::vector<const OptionSpec*> all = all_options(program_, *command_);
+    if (program_.is_self(*command_)) all.insert(all.begin(), &version_flag());
+    all.insert(all.begin(), &help_flag());
+    std::erase_if(all, [](const OptionSpec* option) { return option_names(*option).empty(); });
     return all;
   }
 
-  std::optional<Argument> find(const std::string& name) const {
-    for (const Argument& option : options()) {
-      const std::vector<std::string> names = names_of(option);
+  const OptionSpec* find(const std::string& name) const {
+    for (const OptionSpec* option : options()) {
+      const std::vector<std::string> names = option_names(*option);
       if (std::ranges::find(names, name) != names.end()) return option;
     }
-    return std::nullopt;
+    return nullptr;
   }
 
-  /// The positional argument that comes next, if one does.
-  std::optional<Argument> positional() const {
+  /// The positional argument that comes next, or null.
+  const OptionSpec* positional() const {
     int before = positionals_;
-    for (const Argument& argument : command_.arguments()) {
-      if (!argument.is_positional()) continue;
-      if (before < argument.most_values()) return argument;
-      before -= argument.most_values();
+    for (const OptionSpec& option : command_->options.specs()) {
+      if (!option.form.positional) continue;
+      if (before == 0 || option.list) return &option;
+      --before;
     }
-    return std::nullopt;
+    return nullptr;
   }
 
  private:
   bool descend(const std::string& word) {
-    for (const ArgumentParser& command : command_.commands()) {
-      if (command.name() != word) continue;
+    for (const Command* command : commands()) {
+      if (own_name(*command) != word) continue;
       command_ = command;
       positionals_ = 0;
       return true;
@@ -188,16 +178,16 @@ class Place {
     return false;
   }
 
-  ArgumentParser program_;
-  ArgumentParser command_;
-  std::optional<Argument> pending_;
+  const Program& program_;
+  const Command* command_;
+  const OptionSpec* pending_ = nullptr;
   int positionals_ = 0;
   bool only_positionals_ = false;
 };
 
 }  // namespace
 
-Completion complete(ArgumentParser program, const std::vector<std::string>& words,
+Completion complete(const Program& program, const std::vector<std::string>& words,
                     const std::function<Registry&()>& registry) {
   Place place(program);
   if (words.empty()) return {};
@@ -208,15 +198,15 @@ Completion complete(ArgumentParser program, const std::vector<std::string>& word
     add_value(collector, 0, *place.pending(), registry);
   } else if (typed.starts_with('-') && place.options_may_follow()) {
     const std::size_t equals = typed.find('=');
-    const std::optional<Argument> option = place.find(typed.substr(0, equals));
+    const OptionSpec* option = place.find(typed.substr(0, equals));
     if (equals != std::string::npos && option) add_value(collector, equals + 1, *option, registry);
-    for (const Argument& each : place.options()) {
-      for (const std::string& name : names_of(each)) collector.add(name, each.description());
+    for (const OptionSpec* each : place.options()) {
+      for (const std::string& name : option_names(*each)) collector.add(name, each->help);
     }
   } else {
-    for (const ArgumentParser& command : place.command().commands())
-      collector.add(command.name(), command.description());
-    if (const std::optional<Argument> argument = place.positional())
+    for (const Command* command : place.commands())
+      collector.add(own_name(*command), command->summary);
+    if (const OptionSpec* argument = place.positional())
       add_value(collector, 0, *argument, registry);
   }
   return collector.result();

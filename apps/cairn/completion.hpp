@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "arguments.hpp"
+#include "program.hpp"
 
 namespace cairn {
 class Registry;
@@ -27,7 +27,7 @@ struct Completion {
 /// What may stand in place of the last of the `words`, which follow "cairn" on a command line that
 /// is being typed: commands, options, and for the value of an option names of components, their
 /// options and the values of these. `registry` is asked for components alone: it takes time.
-Completion complete(ArgumentParser program, const std::vector<std::string>& words,
+Completion complete(const Program& program, const std::vector<std::string>& words,
                     const std::function<Registry&()>& registry);
 
 /// A line for each candidate: word, tab, description. A line without a word says that files may

@@ -4,7 +4,6 @@
 
 #include <fmt/core.h>
 
-#include "arguments.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "commands.hpp"
@@ -24,6 +23,33 @@ struct ConvertOptions {
   std::string axes;          ///< of IN
   std::string ground_truth;  ///< file, or empty
   InputOptions input;
+
+  static auto fields() {
+    using O = ConvertOptions;
+    return OptionFields<O>()
+        .text("in", &O::input_file, kGraphHelp)
+        .positional()
+        .placeholder("IN")
+        .or_generated_by({"generator"})
+        .required()
+        .text("output", &O::output_file,
+              "file, also as -o OUT (packed if it ends in .gz; - is standard output)")
+        .positional(true)
+        .letter('o')
+        .placeholder("OUT")
+        .required()
+        .component("to", &O::output_format, {"format"}, "format of OUT, instead of by the ending")
+        .placeholder("FORMAT")
+        .choice("axes", &O::axes, {"robot", "camera"},
+                "of IN, a trajectory: camera (z ahead, y down) is turned into robot (x ahead, z "
+                "up)")
+        .placeholder("AXES")
+        .optional()
+        .text("ground_truth", &O::ground_truth,
+              "write the true states too, of a graph that has them beside")
+        .placeholder("FILE")
+        .part(&O::input);
+  }
 };
 
 boost::json::object report_json(const ConvertOptions& options, const LoadedGraph& loaded,
@@ -86,35 +112,15 @@ int run(const ConvertOptions& options, Session& session) {
 
 }  // namespace
 
-Command add_convert(ArgumentParser program) {
-  auto options = std::make_shared<ConvertOptions>();  // lives as long as the parser and the run
-  ArgumentParser cli =
-      program.add_command("convert", "write a graph or its trajectory in another format");
-  cli.add_option("in", options->input_file, kGraphHelp)
-      .type_name("IN")
-      .file_or_generated({"generator"})
-      .required();
-  cli.add_option("-o,--output,out", options->output_file,
-                 "file, also as -o OUT (packed if it ends in .gz; - is standard output)")
-      .type_name("OUT")
-      .required();
-  cli.add_option("--to", options->output_format, "format of OUT, instead of by the ending")
-      .component({"format"})
-      .type_name("FORMAT");
-  add_axes_option(cli, options->axes,
-                  "of IN, a trajectory: camera (z ahead, y down) is turned into robot (x ahead, z "
-                  "up)");
-  cli.add_option("--ground-truth", options->ground_truth,
-                 "write the true states too, of a graph that has them beside")
-      .type_name("FILE");
-  add_input_options(cli, options->input);
-  cli.footer(
+Command convert_command() {
+  return make_command<ConvertOptions>(
+      "convert", "write a graph or its trajectory in another format",
       "Example:\n"
       "  cairn convert manhattan_isam.txt manhattan.g2o.gz\n"
       "  cairn convert best.g2o - --to tum\n"
       "  cairn convert 00.txt robot.tum --axes camera\n"
-      "  cairn convert drone.pyfg drone.g2o --ground-truth truth.g2o");
-  return {cli, [options](Session& session) { return run(*options, session); }};
+      "  cairn convert drone.pyfg drone.g2o --ground-truth truth.g2o",
+      run);
 }
 
 }  // namespace cairn::app

@@ -9,7 +9,6 @@
 
 #include <fmt/core.h>
 
-#include "arguments.hpp"
 #include "cairn/evaluation/trajectory.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
@@ -34,6 +33,25 @@ struct TrajectoryOptions {
   std::string file;
   std::string stamps;  ///< file of time stamps; empty: those of the trajectory's own file, if any
   std::string axes = "robot";
+
+  /// --stamps and --axes of ESTIMATE, or with "truth_" before them those of TRUTH.
+  static auto fields(const std::string& prefix, const std::string& of) {
+    using O = TrajectoryOptions;
+    return OptionFields<O>()
+        .text(prefix + "stamps", &O::stamps,
+              "time stamps of " + of + ", one per line, by rising id")
+        .placeholder("FILE")
+        .choice(prefix + "axes", &O::axes, {"robot", "camera"},
+                "of " + of + ": robot (x ahead, z up) or camera (z ahead, y down)")
+        .placeholder("AXES");
+  }
+  static auto file_field(const std::string& name, const char* placeholder, const char* help) {
+    return OptionFields<TrajectoryOptions>()
+        .text(name, &TrajectoryOptions::file, help)
+        .positional()
+        .placeholder(placeholder)
+        .required();
+  }
 };
 
 struct EvaluateOptions {
@@ -47,6 +65,43 @@ struct EvaluateOptions {
   std::string compared_at = "common";
   std::string linear_solver = kDefaultLinearSolver;  ///< of the KLD
   std::string latex;
+
+  static auto fields() {
+    using O = EvaluateOptions;
+    constexpr double kAny = std::numeric_limits<double>::infinity();
+    return OptionFields<O>()
+        .part(&O::estimate,
+              TrajectoryOptions::file_field("estimate", "ESTIMATE", "graph or trajectory"))
+        .part(&O::truth, TrajectoryOptions::file_field(
+                             "truth", "TRUTH", "the same poses, by id or time, where they were"))
+        .choice("match", &O::match, {"id", "stamp"},
+                "pair poses by id or stamp; else by stamp where both have times. id: row numbers "
+                "are ids where a file has none")
+        .placeholder("BY")
+        .optional()
+        .real("max_time_difference", &O::max_time_difference, 0.0, kAny,
+              "how far apart the stamps of a pair may be [s] [0.01]")
+        .placeholder("S")
+        .real("offset", &O::offset, -kAny, kAny, "added to the stamps of ESTIMATE [s] [0]")
+        .placeholder("S")
+        .part(&O::estimate, TrajectoryOptions::fields("", "ESTIMATE"))
+        .part(&O::truth, TrajectoryOptions::fields("truth_", "TRUTH"))
+        .boolean("planar", &O::planar, "compare x, y and yaw only, as seen on a map")
+        .boolean("align_scale", &O::scale,
+                 "align with a scale too, which the estimate of one camera lacks")
+        .boolean("kld", &O::kld,
+                 "also the divergence D(TRUTH||ESTIMATE) of two graphs on the variables of both, "
+                 "in nats")
+        .choice("compared_at", &O::compared_at, {"common", "minima"},
+                "for --kld both are linearised at the states of TRUTH (common), or each at its "
+                "own (minima)")
+        .placeholder("WHERE")
+        .component("linear_solver", &O::linear_solver, {"linear_solver"},
+                   "gives covariances for --kld")
+        .text("latex", &O::latex, kLatexHelp)
+        .placeholder("FILE")
+        .part(&O::input);
+  }
 
   StampMatching matching() const {
     StampMatching m;
@@ -450,64 +505,11 @@ int run(const EvaluateOptions& options, Session& session) {
   return 0;
 }
 
-void add_trajectory_options(ArgumentParser cli, TrajectoryOptions& options,
-                            const std::string& prefix, const std::string& name) {
-  cli.add_option("--" + prefix + "stamps", options.stamps,
-                 "time stamps of " + name + ", one per line, by rising id")
-      .type_name("FILE");
-  cli.add_option("--" + prefix + "axes", options.axes,
-                 "of " + name + ": robot (x ahead, z up) or camera (z ahead, y down)")
-      .type_name("AXES")
-      .one_of({"robot", "camera"})
-      .show_default();
-}
-
 }  // namespace
 
-Command add_evaluate(ArgumentParser program) {
-  auto options = std::make_shared<EvaluateOptions>();  // lives as long as the parser and the run
-  ArgumentParser cli =
-      program.add_command("evaluate", "errors of an estimate against the ground truth");
-  cli.add_option("estimate", options->estimate.file, "graph or trajectory")
-      .type_name("ESTIMATE")
-      .required();
-  cli.add_option("truth", options->truth.file, "the same poses, by id or time, where they were")
-      .type_name("TRUTH")
-      .required();
-  cli.add_option("--match", options->match,
-                 "pair poses by id or stamp; else by stamp where both have times. id: row numbers "
-                 "are ids where a file has none")
-      .type_name("BY")
-      .one_of({"id", "stamp"});
-  cli.add_option("--max-time-difference", options->max_time_difference,
-                 "how far apart the stamps of a pair may be [s]")
-      .type_name("S")
-      .seconds_from(0.0)
-      .show_default("0.01");
-  cli.add_option("--offset", options->offset, "added to the stamps of ESTIMATE [s]")
-      .type_name("S")
-      .seconds_from(std::numeric_limits<double>::lowest())
-      .show_default("0");
-  add_trajectory_options(cli, options->estimate, "", "ESTIMATE");
-  add_trajectory_options(cli, options->truth, "truth-", "TRUTH");
-  cli.add_flag("--planar", options->planar, "compare x, y and yaw only, as seen on a map");
-  cli.add_flag("--align-scale", options->scale,
-               "align with a scale too, which the estimate of one camera lacks");
-  cli.add_flag("--kld", options->kld,
-               "also the divergence D(TRUTH||ESTIMATE) of two graphs on the variables of both, in "
-               "nats");
-  cli.add_option("--compared-at", options->compared_at,
-                 "for --kld both are linearised at the states of TRUTH (common), or each at its "
-                 "own (minima)")
-      .type_name("WHERE")
-      .one_of({"common", "minima"})
-      .show_default();
-  cli.add_option("--linear-solver", options->linear_solver, "gives covariances for --kld")
-      .component({"linear_solver"})
-      .show_default();
-  add_latex_option(cli, options->latex);
-  add_input_options(cli, options->input);
-  cli.footer(
+Command evaluate_command() {
+  return make_command<EvaluateOptions>(
+      "evaluate", "errors of an estimate against the ground truth",
       "Root mean squares: ATE after the rigid motion that brings ESTIMATE nearest to TRUTH, RPE "
       "between\n"
       "consecutive poses, RPE all to all over every pair; translation in metres, rotation in "
@@ -517,8 +519,8 @@ Command add_evaluate(ArgumentParser program) {
       "  cairn evaluate best.g2o truth.g2o --json errors.json\n"
       "  cairn evaluate slam.tum poses.txt --truth-stamps times.txt --truth-axes camera\n"
       "  cairn evaluate camera.tum euroc.csv --align-scale\n"
-      "  cairn evaluate sparse.g2o best.g2o --kld");
-  return {cli, [options](Session& session) { return run(*options, session); }};
+      "  cairn evaluate sparse.g2o best.g2o --kld",
+      run);
 }
 
 }  // namespace cairn::app

@@ -15,7 +15,6 @@
 
 #include <fmt/core.h>
 
-#include "arguments.hpp"
 #include "cairn/exploration/explorer_comparison.hpp"
 #include "cairn/exploration/recorded_world.hpp"
 #include "cairn/exploration/scan_log.hpp"
@@ -49,7 +48,7 @@ struct ExploreOptions {
   SlamNames slam{.policy = ExplorationSetup::kPolicy};
   std::string explorer = ExplorationSetup::kExplorer;
   std::string until, match;
-  double decision_budget = std::numeric_limits<double>::infinity();  // [s]
+  std::optional<double> decision_budget;  // [s]
   ComparisonOptions comparison;
   std::uint64_t seed = 1;
   bool no_consecutive = false;
@@ -57,6 +56,73 @@ struct ExploreOptions {
   std::string output, trajectory, truth, map, steps, log, loss;
   RunRecordingOptions recording;
   bool live = false;
+
+  double most_of_a_decision() const {  // [s]
+    return decision_budget.value_or(std::numeric_limits<double>::infinity());
+  }
+
+  static auto fields() {
+    using O = ExploreOptions;
+    constexpr double kAny = std::numeric_limits<double>::infinity();
+    return OptionFields<O>()
+        .text("floor", &O::floor, "the floor: floor.yaml, or @KIND[:k=v] to generate")
+        .positional()
+        .placeholder("FLOOR")
+        .or_generated_by({"floor_plan"})
+        .text("output", &O::output, "write the graph of the poses that are kept")
+        .letter('o')
+        .placeholder("OUT")
+        .text("map", &O::map, "write the map that was built")
+        .placeholder("FILE")
+        .text("trajectory", &O::trajectory, "write all poses, those left out put back")
+        .placeholder("FILE")
+        .text("truth", &O::truth, "write where the robot truly was")
+        .placeholder("FILE")
+        .text("steps", &O::steps, "a row for each motion, as CSV")
+        .placeholder("FILE")
+        .text("log", &O::log, "write scans, odometry and true poses as a log of CARMEN, run.clf.gz")
+        .placeholder("FILE")
+        .part(&O::recording)
+        .components("explorer", &O::explorer, {"explorer"},
+                    "decides where to drive; options as NAME:k=v; several, A,B, are compared; "
+                    "frontier finishes small floors sooner")
+        .text("until", &O::until,
+              "limits: distance=250 [m], steps=N, decisions=N, known=0.99 of what the body can "
+              "cover, rate=0.5 [m²/m] that the last 20 m brought")
+        .placeholder("K=V,…")
+        .part(&O::comparison)
+        .real("decision_budget", &O::decision_budget, 1e-3, kAny,
+              "within which explorers decide [s], as far as they can: then no run is like the "
+              "other")
+        .placeholder("S")
+        .text("match", &O::match,
+              "loop closures as explorers expect them: range=1,angle=0.35,sigma_xy=0.05")
+        .placeholder("K=V,…")
+        .boolean("no_consecutive", &O::no_consecutive,
+                 "match no scan with the one before: odometry alone leads from one to the next")
+        .text("lidar", &O::lidar, "options of the lidar: fov=180,range=8,beams=181")
+        .placeholder("K=V,…")
+        .text("odometry", &O::odometry, "its noise: relative=0.15,sigma_xy=0.01")
+        .placeholder("K=V,…")
+        .real("start_x", &O::start_x, -kAny, kAny,
+              "where the robot starts [m]; default: the widest place")
+        .placeholder("M")
+        .real("start_y", &O::start_y, -kAny, kAny, "goes with --start-x")
+        .placeholder("M")
+        .real("start_theta", &O::start_theta, -kAny, kAny,
+              "its heading there [rad]; default: 0; without --start-x by the seed")
+        .placeholder("RAD")
+        .integer("seed", &O::seed, 0, kMostSeed, "of all noise and random choices")
+        .component("world", &O::world, {"world"},
+                   "the robot; its options: cairn plugins lidar_building, motion=holonomic or "
+                   "motion=dubins for instance; log:file=robot.clf is one that was recorded, and "
+                   "goes where it went, without a FLOOR")
+        .component("loss", &O::loss, {"loss"},
+                   "robust loss of loop closures, or none [none; of a recorded robot "
+                   "cauchy:scale=2]")
+        .part(&O::slam)
+        .boolean("live", &O::live, "draw map, trajectory and path in the terminal on the way");
+  }
 };
 
 /// "range=8,fov=180" among the options of a component.
@@ -299,7 +365,7 @@ int compare_explorers(const ExploreOptions& options, Session& session) {
                                .start = start,
                                .limits = limits,
                                .match = match,
-                               .decision_budget = options.decision_budget,
+                               .decision_budget = options.most_of_a_decision(),
                                .loop_loss = loss,
                                .match_consecutive = !options.no_consecutive};
   return run_comparison(options.comparison, options.recording.page, setup, options.floor, parts,
@@ -309,7 +375,7 @@ int compare_explorers(const ExploreOptions& options, Session& session) {
 int run_explore(const ExploreOptions& options, Session& session) {
   check(options, session);
   session.use_threads();
-  if (std::isfinite(options.decision_budget))
+  if (options.decision_budget)
     session.note("with --decision-budget the clock decides: this run can't be repeated exactly");
   if (compares(options)) return compare_explorers(options, session);
   Registry& registry = session.registry();
@@ -345,7 +411,7 @@ int run_explore(const ExploreOptions& options, Session& session) {
       .start = {.floor = floor ? &floor->grid : nullptr, .pose = start, .seed = options.seed},
       .limits = limits,
       .match = match,
-      .decision_budget = options.decision_budget,
+      .decision_budget = options.most_of_a_decision(),
       .sample_distance = ExplorationSetup::kSampleDistance,
       .interrupt = &guard.flag(),
       .decided = [&](const Decision& decision, const Situation&) { progress.decided(decision); },
@@ -358,7 +424,7 @@ int run_explore(const ExploreOptions& options, Session& session) {
   ExploreOutcome outcome{.floor = options.floor,
                          .frame = {},
                          .parts = parts,
-                         .repeatable = !std::isfinite(options.decision_budget),
+                         .repeatable = !options.decision_budget,
                          .result = run_exploration(exploration),
                          .log = std::move(log)};
   outcome.frame = floor ? floor->grid.frame : outcome.result.map.frame;
@@ -376,72 +442,9 @@ int run_explore(const ExploreOptions& options, Session& session) {
 
 }  // namespace
 
-Command add_explore(ArgumentParser program) {
-  auto options = std::make_shared<ExploreOptions>();  // lives as long as the parser and the run
-  ArgumentParser cli = program.add_command(
-      "explore", "a simulated robot explores a floor, and decides by itself where to drive");
-  cli.add_option("floor", options->floor, "the floor: floor.yaml, or @KIND[:k=v] to generate")
-      .type_name("FLOOR")
-      .file_or_generated({"floor_plan"});
-  cli.add_option("-o,--output", options->output, "write the graph of the poses that are kept")
-      .type_name("OUT");
-  cli.add_option("--map", options->map, "write the map that was built").type_name("FILE");
-  cli.add_option("--trajectory", options->trajectory, "write all poses, those left out put back")
-      .type_name("FILE");
-  cli.add_option("--truth", options->truth, "write where the robot truly was").type_name("FILE");
-  cli.add_option("--steps", options->steps, "a row for each motion, as CSV").type_name("FILE");
-  cli.add_option("--log", options->log,
-                 "write scans, odometry and true poses as a log of CARMEN, run.clf.gz")
-      .type_name("FILE");
-  add_recording_options(cli, options->recording);
-  cli.add_option(
-         "--explorer", options->explorer,
-         "decides where to drive; options as NAME:k=v; several, A,B, are compared; frontier "
-         "finishes small floors sooner")
-      .components({"explorer"})
-      .show_default();
-  cli.add_option(
-         "--until", options->until,
-         "limits: distance=250 [m], steps=N, decisions=N, known=0.99 of what the body can cover, "
-         "rate=0.5 [m²/m] that the last 20 m brought")
-      .type_name("K=V,…");
-  add_comparison_options(cli, options->comparison);
-  cli.add_option(
-         "--decision-budget", options->decision_budget,
-         "within which explorers decide [s], as far as they can: then no run is like the other")
-      .type_name("S")
-      .seconds_from(1e-3);
-  cli.add_option("--match", options->match,
-                 "loop closures as explorers expect them: range=1,angle=0.35,sigma_xy=0.05")
-      .type_name("K=V,…");
-  cli.add_flag("--no-consecutive", options->no_consecutive,
-               "match no scan with the one before: odometry alone leads from one to the next");
-  cli.add_option("--lidar", options->lidar, "options of the lidar: fov=180,range=8,beams=181")
-      .type_name("K=V,…");
-  cli.add_option("--odometry", options->odometry, "its noise: relative=0.15,sigma_xy=0.01")
-      .type_name("K=V,…");
-  cli.add_option("--start-x", options->start_x,
-                 "where the robot starts [m]; default: the widest place")
-      .type_name("M");
-  cli.add_option("--start-y", options->start_y, "goes with --start-x").type_name("M");
-  cli.add_option("--start-theta", options->start_theta,
-                 "its heading there [rad]; default: 0; without --start-x by the seed")
-      .type_name("RAD");
-  cli.add_option("--seed", options->seed, "of all noise and random choices")
-      .type_name("N")
-      .show_default();
-  cli.add_option("--world", options->world,
-                 "the robot; its options: cairn plugins lidar_building, motion=holonomic or "
-                 "motion=dubins for instance; log:file=robot.clf is one that was recorded, and "
-                 "goes where it went, without a FLOOR")
-      .component({"world"})
-      .show_default();
-  cli.add_option("--loss", options->loss,
-                 "robust loss of loop closures, or none [none; of a recorded robot cauchy:scale=2]")
-      .component({"loss"});
-  add_slam_options(cli, options->slam);
-  cli.add_flag("--live", options->live, "draw map, trajectory and path in the terminal on the way");
-  cli.footer(
+Command explore_command() {
+  return make_command<ExploreOptions>(
+      "explore", "a simulated robot explores a floor, and decides by itself where to drive",
       "Example:\n"
       "  cairn explore @rooms:seed=3\n"
       "  cairn explore floor.yaml --until distance=250 --odometry relative=0.15 -o run.g2o --map "
@@ -449,8 +452,8 @@ Command add_explore(ArgumentParser program) {
       "  cairn explore floor.yaml --record run.jsonl && cairn view run.jsonl -o run.html\n"
       "  cairn explore --world log:file=robot.clf.gz --record run.jsonl --map map.yaml\n"
       "  cairn explore floor.yaml --explorer frontier,random --runs 20 --csv runs.csv --html "
-      "compare.html");
-  return {cli, [options](Session& session) { return run_explore(*options, session); }};
+      "compare.html",
+      run_explore);
 }
 
 }  // namespace cairn::app

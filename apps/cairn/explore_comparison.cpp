@@ -92,17 +92,17 @@ int exit_code(const std::vector<ComparedRun>& runs) {
 
 }  // namespace
 
-void add_comparison_options(ArgumentParser cli, ComparisonOptions& options) {
-  cli.add_option("--runs", options.runs,
-                 "of each explorer, with the seeds from --seed on, on --threads threads")
-      .type_name("N")
-      .within(1, 100000)
-      .show_default();
-  cli.add_option("--csv", options.csv, "a row for each run (- is standard output)")
-      .type_name("FILE");
-  cli.add_option("--curves", options.curves, "mean curves of entropies and errors, as CSV")
-      .type_name("FILE");
-  add_latex_option(cli, options.latex);
+OptionFields<ComparisonOptions> ComparisonOptions::fields() {
+  using O = ComparisonOptions;
+  return OptionFields<O>()
+      .integer("runs", &O::runs, 1, 100000,
+               "of each explorer, with the seeds from --seed on, on --threads threads")
+      .text("csv", &O::csv, "a row for each run (- is standard output)")
+      .placeholder("FILE")
+      .text("curves", &O::curves, "mean curves of entropies and errors, as CSV")
+      .placeholder("FILE")
+      .text("latex", &O::latex, kLatexHelp)
+      .placeholder("FILE");
 }
 
 void check_comparison(const ComparisonOptions& options, const std::string& page, Session& session) {

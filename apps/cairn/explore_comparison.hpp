@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "arguments.hpp"
 #include "cairn/exploration/explorer_comparison.hpp"
 #include "explore_report.hpp"
 #include "session.hpp"
@@ -19,10 +18,10 @@ struct ComparisonOptions {
   bool asked_for(const std::vector<std::string>& explorers) const {
     return explorers.size() > 1 || runs > 1 || !csv.empty() || !curves.empty() || !latex.empty();
   }
+
+  static OptionFields<ComparisonOptions> fields();
 };
 
-/// --runs, --csv, --curves and --latex.
-void add_comparison_options(ArgumentParser cli, ComparisonOptions& options);
 /// Finds out before the work whether its files can be written.
 void check_comparison(const ComparisonOptions& options, const std::string& page, Session& session);
 

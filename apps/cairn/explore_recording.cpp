@@ -20,18 +20,19 @@
 
 namespace cairn::app {
 
-void add_recording_options(ArgumentParser cli, RunRecordingOptions& options) {
-  cli.add_option("--record", options.record,
-                 "map, graph, scans and decisions as the run goes on, for cairn view")
-      .type_name("FILE");
-  cli.add_option("--html", options.page,
-                 "the same as a page for the browser, or of a comparison its tables and curves")
-      .type_name("PAGE");
-  cli.add_option("--serve", options.port,
-                 "show it while the run goes on, to browsers on this machine: "
-                 "http://127.0.0.1:PORT/; 0: any port that is free")
-      .type_name("PORT")
-      .within(0, 65535);
+OptionFields<RunRecordingOptions> RunRecordingOptions::fields() {
+  using O = RunRecordingOptions;
+  return OptionFields<O>()
+      .text("record", &O::record,
+            "map, graph, scans and decisions as the run goes on, for cairn view")
+      .placeholder("FILE")
+      .text("html", &O::page,
+            "the same as a page for the browser, or of a comparison its tables and curves")
+      .placeholder("PAGE")
+      .integer("serve", &O::port, 0, 65535,
+               "show it while the run goes on, to browsers on this machine: "
+               "http://127.0.0.1:PORT/; 0: any port that is free")
+      .placeholder("PORT");
 }
 
 void check_recording(const RunRecordingOptions& options, Session& session) {

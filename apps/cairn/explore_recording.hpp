@@ -6,7 +6,6 @@
 #include <optional>
 #include <string>
 
-#include "arguments.hpp"
 #include "cairn/exploration/exploration.hpp"
 #include "cairn/exploration/recorder.hpp"
 #include "cairn/exploration/run_server.hpp"
@@ -19,8 +18,9 @@ namespace cairn::app {
 struct RunRecordingOptions {
   std::string record, page;
   std::optional<std::int64_t> port;  ///< 0: any that is free
+
+  static OptionFields<RunRecordingOptions> fields();
 };
-void add_recording_options(ArgumentParser cli, RunRecordingOptions& options);
 /// Finds out before the run whether both can be written. Throws `Error`.
 void check_recording(const RunRecordingOptions& options, Session& session);
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -9,6 +10,7 @@
 #include <boost/json/object.hpp>
 
 #include "cairn/grid/grid.hpp"
+#include "cairn/plugin/option_fields.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/typed/pose2.hpp"
 #include "session.hpp"
@@ -42,6 +44,18 @@ void check_map_file(const std::string& file, const char* option, Session& sessio
 struct FloorInfoOptions {
   double radius = 0.2;                         ///< of a robot's body [m]
   std::optional<double> start_x{}, start_y{};  ///< [m]
+
+  static auto fields() {
+    using O = FloorInfoOptions;
+    constexpr double kAny = std::numeric_limits<double>::infinity();
+    constexpr const char* kStart = "where the robot is, instead of the widest place";
+    return OptionFields<O>()
+        .real("radius", &O::radius, 0.0, 1000.0, "of a robot's body on a floor [m]")
+        .placeholder("R")
+        .real("start_x", &O::start_x, -kAny, kAny, kStart)
+        .real("start_y", &O::start_y, -kAny, kAny, kStart)
+        .placeholder("Y");
+  }
 };
 /// `cairn info` of a floor: its size, what a robot reaches, where it leaks.
 int run_floor_info(const std::string& name, const FloorInfoOptions& options, Session& session);

@@ -5,7 +5,6 @@
 
 #include <fmt/core.h>
 
-#include "arguments.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "commands.hpp"
@@ -24,6 +23,28 @@ struct GenerateOptions {
   std::string output_format;
   std::string ground_truth;
   std::uint64_t seed = 0;
+
+  static auto fields() {
+    using O = GenerateOptions;
+    return OptionFields<O>()
+        .component("kind", &O::kind, {"generator", "floor_plan"},
+                   "generator: manhattan, sphere …, or floor plan: rooms, cave … (cairn plugins "
+                   "lists them)")
+        .positional()
+        .placeholder("KIND[:k=v]")
+        .required()
+        .text("output", &O::output, "the noisy graph (- is standard output)")
+        .letter('o')
+        .placeholder("OUT")
+        .required()
+        .text("ground_truth", &O::ground_truth, "the same graph at its true states")
+        .placeholder("FILE")
+        .component("to", &O::output_format, {"format"}, "format, instead of by the ending")
+        .placeholder("FORMAT")
+        .integer("seed", &O::seed, 0, kMostSeed,
+                 "seed of the noise; the same seed gives the same graph")
+        .placeholder("S");
+  }
 };
 
 boost::json::object report_json(const GenerateOptions& options, const Simulation& simulation) {
@@ -65,33 +86,14 @@ int run(const GenerateOptions& options, Session& session) {
 
 }  // namespace
 
-Command add_generate(ArgumentParser program) {
-  auto options = std::make_shared<GenerateOptions>();  // lives as long as the parser and the run
-  ArgumentParser cli =
-      program.add_command("generate", "make a simulated graph, with its ground truth, or a floor");
-  cli.add_option(
-         "kind", options->kind,
-         "generator: manhattan, sphere …, or floor plan: rooms, cave … (cairn plugins lists them)")
-      .component({"generator", "floor_plan"})
-      .type_name("KIND[:k=v]")
-      .required();
-  cli.add_option("-o,--output", options->output, "the noisy graph (- is standard output)")
-      .type_name("OUT")
-      .required();
-  cli.add_option("--ground-truth", options->ground_truth, "the same graph at its true states")
-      .type_name("FILE");
-  cli.add_option("--to", options->output_format, "format, instead of by the ending")
-      .component({"format"})
-      .type_name("FORMAT");
-  cli.add_option("--seed", options->seed, "seed of the noise; the same seed gives the same graph")
-      .type_name("S")
-      .show_default();
-  cli.footer(
+Command generate_command() {
+  return make_command<GenerateOptions>(
+      "generate", "make a simulated graph, with its ground truth, or a floor",
       "Example:\n"
       "  cairn generate manhattan:poses=3500 -o graph.g2o --ground-truth truth.g2o --seed 7\n"
       "  cairn generate rooms:width=30 -o floor.yaml --seed 3\n"
-      "Options of a generator: cairn plugins manhattan");
-  return {cli, [options](Session& session) { return run(*options, session); }};
+      "Options of a generator: cairn plugins manhattan",
+      run);
 }
 
 }  // namespace cairn::app

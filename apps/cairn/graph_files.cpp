@@ -11,7 +11,6 @@
 
 #include <fmt/core.h>
 
-#include "arguments.hpp"
 #include "cairn/geometry/pose.hpp"
 #include "cairn/io/format_by_ending.hpp"
 #include "cairn/plugin/registry.hpp"
@@ -114,18 +113,21 @@ bool has_graph_ending(const std::string& file, Registry& registry) {
   return std::find(known.begin(), known.end(), file_ending(file)) != known.end();
 }
 
-void add_input_options(ArgumentParser cli, InputOptions& options) {
-  cli.add_option("--from", options.format, "format of the input, instead of by content")
-      .component({"format"})
-      .type_name("FORMAT");
-  cli.add_flag("--skip-unknown", options.read.skip_unknown,
-               "skip and count lines with unknown tags, and what is on skipped vertices");
-  cli.add_flag("--repair-information", options.read.repair_information,
-               "repair known mistakes in information matrices");
-  cli.add_flag("--unit-information", options.read.unit_information,
-               "take factors without information as of unit information, counted");
-  cli.add_flag("--skip-dangling", options.read.skip_dangling,
-               "leave out and count factors on vertices that the file does not have");
+OptionFields<InputOptions> InputOptions::fields() {
+  return OptionFields<InputOptions>()
+      .component("from", &InputOptions::format, {"format"},
+                 "format of the input, instead of by content")
+      .placeholder("FORMAT")
+      .part(&InputOptions::read,
+            OptionFields<ReadOptions>()
+                .boolean("skip_unknown", &ReadOptions::skip_unknown,
+                         "skip and count lines with unknown tags, and what is on skipped vertices")
+                .boolean("repair_information", &ReadOptions::repair_information,
+                         "repair known mistakes in information matrices")
+                .boolean("unit_information", &ReadOptions::unit_information,
+                         "take factors without information as of unit information, counted")
+                .boolean("skip_dangling", &ReadOptions::skip_dangling,
+                         "leave out and count factors on vertices that the file does not have"));
 }
 
 std::string output_format(const std::string& file, const std::string& named) {

@@ -5,10 +5,9 @@
 #include <optional>
 #include <string>
 
-#include "arguments.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/io/generator.hpp"
-#include "cairn/plugin/options.hpp"
+#include "cairn/plugin/option_fields.hpp"
 #include "session.hpp"
 
 namespace cairn::app {
@@ -17,8 +16,9 @@ namespace cairn::app {
 struct InputOptions {
   std::string format;  ///< empty: by content
   ReadOptions read;
+
+  static OptionFields<InputOptions> fields();
 };
-void add_input_options(ArgumentParser cli, InputOptions& options);
 
 /// Shown where a graph is asked for.
 inline constexpr const char* kGraphHelp =

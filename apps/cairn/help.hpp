@@ -3,18 +3,15 @@
 
 #include <string>
 
-#include "arguments.hpp"
+#include "program.hpp"
 
 namespace cairn::app {
 
-/// "cairn study compact": a command with those it belongs to.
-std::string command_name(const ArgumentParser& command);
-
 /// "cairn generate [OPTIONS] KIND -o OUT": the arguments and options that a command must be given.
-std::string usage_line(const ArgumentParser& command);
+std::string usage_line(const Command& command);
 
 /// Help that fits a screen: at most 40 lines of 100 columns. One line per option, with its default
 /// in brackets; a command's help also names the options that every command takes.
-std::string help_text(const ArgumentParser& command);
+std::string help_text(const Program& program, const Command& command);
 
 }  // namespace cairn::app

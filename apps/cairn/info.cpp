@@ -7,7 +7,6 @@
 
 #include <fmt/core.h>
 
-#include "arguments.hpp"
 #include "cairn/evaluation/graph_survey.hpp"
 #include "cairn/information/graph_information.hpp"
 #include "cairn/plugin/registry.hpp"
@@ -35,6 +34,23 @@ struct InfoOptions {
   FloorInfoOptions floor;
   bool entropy = false;
   std::string linear_solver = kDefaultLinearSolver;  ///< of the entropy
+
+  static auto fields() {
+    using O = InfoOptions;
+    return OptionFields<O>()
+        .text("graph", &O::graph,
+              std::string(kGraphHelp) + "; or the map of a floor (.yaml, .png:resolution=R)")
+        .positional()
+        .placeholder("GRAPH")
+        .or_generated_by({"generator"})
+        .required()
+        .boolean("entropy", &O::entropy,
+                 "entropy of the graph at the states of the file, in nats: optimise it first")
+        .component("linear_solver", &O::linear_solver, {"linear_solver"},
+                   "gives the determinant for --entropy")
+        .part(&O::floor)
+        .part(&O::input);
+  }
 };
 
 /// The entropy that was asked for. Without a value: H is singular.
@@ -237,37 +253,14 @@ int run(const InfoOptions& options, Session& session) {
 
 }  // namespace
 
-Command add_info(ArgumentParser program) {
-  auto options = std::make_shared<InfoOptions>();  // lives as long as the parser and the run
-  ArgumentParser cli =
-      program.add_command("info", "what a graph consists of, and what looks wrong; or a floor");
-  cli.add_option("graph", options->graph,
-                 std::string(kGraphHelp) + "; or the map of a floor (.yaml, .png:resolution=R)")
-      .type_name("GRAPH")
-      .file_or_generated({"generator"})
-      .required();
-  cli.add_flag("--entropy", options->entropy,
-               "entropy of the graph at the states of the file, in nats: optimise it first");
-  cli.add_option("--linear-solver", options->linear_solver, "gives the determinant for --entropy")
-      .component({"linear_solver"})
-      .show_default();
-  cli.add_option("--radius", options->floor.radius, "of a robot's body on a floor [m]")
-      .type_name("R")
-      .within(0.0, 1000.0)
-      .show_default();
-  cli.add_option("--start-x", options->floor.start_x,
-                 "where the robot is, instead of the widest place")
-      .type_name("X");
-  cli.add_option("--start-y", options->floor.start_y,
-                 "where the robot is, instead of the widest place")
-      .type_name("Y");
-  add_input_options(cli, options->input);
-  cli.footer(
-      "Example:\n"
-      "  cairn info sphere2500.g2o --types slam3d:metric=g2o\n"
-      "  cairn info best.g2o --entropy\n"
-      "  cairn info floor.yaml --radius 0.3");
-  return {cli, [options](Session& session) { return run(*options, session); }};
+Command info_command() {
+  return make_command<InfoOptions>("info",
+                                   "what a graph consists of, and what looks wrong; or a floor",
+                                   "Example:\n"
+                                   "  cairn info sphere2500.g2o --types slam3d:metric=g2o\n"
+                                   "  cairn info best.g2o --entropy\n"
+                                   "  cairn info floor.yaml --radius 0.3",
+                                   run);
 }
 
 }  // namespace cairn::app

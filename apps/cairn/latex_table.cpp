@@ -65,11 +65,6 @@ std::string line_of(const std::vector<std::string>& cells) {
 
 }  // namespace
 
-void add_latex_option(ArgumentParser cli, std::string& file) {
-  cli.add_option("--latex", file, "the table as a tabular of LaTeX (- is standard output)")
-      .type_name("FILE");
-}
-
 std::string latex_text(std::string_view text) {
   std::string out;
   while (!text.empty()) {

@@ -4,12 +4,10 @@
 #include <string>
 #include <string_view>
 
-#include "arguments.hpp"
-
 namespace cairn::app {
 
-/// `--latex FILE` of a command whose results are a `Table`; see `Table::latex`.
-void add_latex_option(ArgumentParser cli, std::string& file);
+/// The help of `--latex FILE`, of a command whose results are a `Table`; see `Table::latex`.
+inline constexpr const char* kLatexHelp = "the table as a tabular of LaTeX (- is standard output)";
 
 /// Text for LaTeX: what has a meaning there is escaped, and what only some engines can set (Greek
 /// letters, "±", "²") becomes a command of plain LaTeX.

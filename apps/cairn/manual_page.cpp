@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cctype>
 #include <cstdint>
-#include <optional>
 #include <sstream>
 #include <string>
 #include <string_view>
@@ -15,6 +14,7 @@
 
 #include "cairn/runtime/version.hpp"
 #include "help.hpp"
+#include "option_parser.hpp"
 #include "table.hpp"
 
 namespace cairn::app {
@@ -75,13 +75,12 @@ std::string strong(std::string_view text) { return "\\fB" + roff(text) + "\\fR";
 std::string slanted(std::string_view text) { return "\\fI" + roff(text) + "\\fR"; }
 
 /// "-o, --output OUT", or "GRAPH" of a positional argument.
-std::string head(const Argument& argument) {
-  if (argument.is_positional()) return slanted(argument.type_name());
-  std::vector<std::string> names;
-  for (const std::string& name : argument.short_names()) names.push_back(strong("-" + name));
-  for (const std::string& name : argument.long_names()) names.push_back(strong("--" + name));
-  const std::string text = joined(names, ", ");
-  return argument.most_values() > 0 ? text + " " + slanted(argument.type_name()) : text;
+std::string head(const OptionSpec& option) {
+  if (option.form.positional) return slanted(value_name(option));
+  const std::string letter = short_name(option);
+  const std::string text =
+      (letter.empty() ? "" : strong(letter) + ", ") + strong(long_name(option));
+  return is_flag(option) ? text : text + " " + slanted(value_name(option));
 }
 
 /// The line of a table as a sentence.
@@ -93,17 +92,17 @@ std::string sentence(std::string text) {
 }
 
 /// What is known of its value besides: the default, the choices, the kinds of component.
-std::string about_value(const Argument& argument) {
+std::string about_value(const OptionSpec& option) {
   std::string text;
-  if (const std::string value = argument.default_text(); !value.empty())
+  if (const std::string value = shown_default(option); !value.empty())
     text += "Default: " + strong(value) + ".\n";
-  const ValueWords& words = argument.words();
-  if (!words.choices.empty()) {
+  const bool is_component = option.type == OptionType::component;
+  if (!is_component && !option.choices.empty()) {
     std::vector<std::string> choices;
-    for (const std::string& choice : words.choices) choices.push_back(strong(choice));
+    for (const std::string& choice : option.choices) choices.push_back(strong(choice));
     text += "One of " + joined(choices, ", ") + ".\n";
   }
-  for (const std::string& kind : words.kinds) {
+  for (const std::string& kind : is_component ? option.choices : std::vector<std::string>()) {
     std::string in_words = kind;
     std::ranges::replace(in_words, '_', ' ');
     text += "Names of kind " + roff(in_words) + ": " + strong("cairn plugins") + ".\n";
@@ -111,12 +110,22 @@ std::string about_value(const Argument& argument) {
   return text;
 }
 
-std::string items(const std::vector<Argument>& arguments, bool positional) {
+std::string item(const OptionSpec& option) {
+  return ".TP\n" + head(option) + "\n" + roff(sentence(option.help)) + "\n" + about_value(option);
+}
+
+std::string arguments(const Command& command) {
   std::string text;
-  for (const Argument& argument : arguments) {
-    if (argument.is_positional() != positional) continue;
-    text += ".TP\n" + head(argument) + "\n" + roff(sentence(argument.description())) + "\n" +
-            about_value(argument);
+  for (const OptionSpec& option : command.options.specs()) {
+    if (option.form.positional) text += item(option);
+  }
+  return text;
+}
+
+std::string options(const Command& command) {
+  std::string text;
+  for (const OptionSpec& option : command.options.specs()) {
+    if (!option.form.positional) text += item(option);
   }
   return text;
 }
@@ -156,31 +165,26 @@ Footer parts_of(const std::string& footer) {
   return parts;
 }
 
-std::string synopsis(const ArgumentParser& command) {
-  const std::string name = command_name(command);
-  if (!command.commands().empty())
+std::string synopsis(const Program& program, const Command& command) {
+  const std::string name = full_name(command);
+  if (!program.below(command).empty())
     return strong(name) + " " + slanted("COMMAND") + " [" + slanted("OPTIONS") + "]\n";
   return strong(name) + roff(usage_line(command).substr(name.size())) + "\n";
 }
 
 /// The summary that `whatis` and `apropos` search.
-std::string summary(const ArgumentParser& command) {
-  const std::string text = command.description();
-  return command.parent() || !text.starts_with("cairn: ") ? text : text.substr(7);
+std::string summary(const Command& command) {
+  const std::string& text = command.summary;
+  return text.starts_with("cairn: ") ? text.substr(7) : text;
 }
 
-std::string command_list(const ArgumentParser& command) {
+std::string command_list(const Program& program, const Command& command) {
   std::string text;
-  for (const ArgumentParser& each : command.commands()) {
-    text += ".TP\n.BR " + roff(manual_page_name(each)) + " (1)\n" +
-            roff(sentence(each.description())) + "\n";
+  for (const Command* each : program.below(command)) {
+    text += ".TP\n.BR " + roff(manual_page_name(*each)) + " (1)\n" + roff(sentence(each->summary)) +
+            "\n";
   }
   return text;
-}
-
-ArgumentParser program_of(const ArgumentParser& command) {
-  const std::optional<ArgumentParser> parent = command.parent();
-  return parent ? program_of(*parent) : command;
 }
 
 std::string exit_codes() {
@@ -204,11 +208,13 @@ std::string environment() {
          ".TP\n.B NO_COLOR\nIf set and not empty, nothing is coloured.\n";
 }
 
-std::string see_also(const ArgumentParser& command) {
-  std::vector<std::string> names;
-  for (std::optional<ArgumentParser> above = command.parent(); above; above = above->parent())
-    names.push_back(manual_page_name(*above));
+/// The page of the command that it belongs to, that of the program, and two that everybody needs.
+std::string see_also(const Program& program, const Command& command) {
   const std::string own = manual_page_name(command);
+  std::vector<std::string> names;
+  const std::size_t blank = command.name.find(' ');
+  if (blank != std::string::npos) names.push_back("cairn-" + command.name.substr(0, blank));
+  if (!program.is_self(command)) names.emplace_back("cairn");
   for (const char* name : {"cairn-plugins", "cairn-optimize"}) {
     if (own != name) names.emplace_back(name);
   }
@@ -220,34 +226,33 @@ std::string see_also(const ArgumentParser& command) {
 
 }  // namespace
 
-std::string manual_page_name(const ArgumentParser& command) {
-  std::string name = command_name(command);
+std::string manual_page_name(const Command& command) {
+  std::string name = full_name(command);
   std::ranges::replace(name, ' ', '-');
   return name;
 }
 
-std::string manual_page(const ArgumentParser& command) {
+std::string manual_page(const Program& program, const Command& command) {
   const std::string name = manual_page_name(command);
   std::string title = name;
   std::ranges::transform(title, title.begin(),
                          [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
-  const ArgumentParser program = program_of(command);
-  const bool is_program = !command.parent();
-  const std::vector<Argument> arguments = command.arguments();
-  const Footer footer = parts_of(command.footer());
+  const bool is_program = program.is_self(command);
+  const Footer footer = parts_of(command.remarks);
+  const std::string own =
+      item(help_flag()) + (is_program ? item(version_flag()) : "") + options(command);
   return ".\\\" Written by cairn help --man.\n.TH " + roff(title) +
          " 1 \"\" \"cairn " CAIRN_VERSION "\" \"User Commands\"\n.ad l\n.nh\n" +
          section("NAME", roff(name) + " \\- " + roff(summary(command)) + "\n") +
-         section("SYNOPSIS", synopsis(command)) +
+         section("SYNOPSIS", synopsis(program, command)) +
          section("DESCRIPTION", roff(sentence(summary(command))) + "\n" +
                                     (footer.remarks.empty() ? "" : ".PP\n" + footer.remarks)) +
-         section("COMMANDS", command_list(command)) + section("ARGUMENTS", items(arguments, true)) +
-         section(is_program ? "OPTIONS OF EVERY COMMAND" : "OPTIONS", items(arguments, false)) +
-         (is_program
-              ? ""
-              : section("OPTIONS OF EVERY COMMAND", items(program.arguments_but_help(), false))) +
+         section("COMMANDS", command_list(program, command)) +
+         section("ARGUMENTS", arguments(command)) +
+         section(is_program ? "OPTIONS OF EVERY COMMAND" : "OPTIONS", own) +
+         (is_program ? "" : section("OPTIONS OF EVERY COMMAND", options(program.self))) +
          section("EXIT STATUS", exit_codes()) + section("ENVIRONMENT", environment()) +
-         section("EXAMPLES", footer.examples) + section("SEE ALSO", see_also(command));
+         section("EXAMPLES", footer.examples) + section("SEE ALSO", see_also(program, command));
 }
 
 }  // namespace cairn::app

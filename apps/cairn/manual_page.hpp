@@ -3,15 +3,15 @@
 
 #include <string>
 
-#include "arguments.hpp"
+#include "program.hpp"
 
 namespace cairn::app {
 
 /// "cairn-study-compact": the name of a command's page.
-std::string manual_page_name(const ArgumentParser& command);
+std::string manual_page_name(const Command& command);
 
 /// The manual page of a command, or of the program: its help with what every command takes, exit
 /// codes and environment, in the language of man (roff).
-std::string manual_page(const ArgumentParser& command);
+std::string manual_page(const Program& program, const Command& command);
 
 }  // namespace cairn::app

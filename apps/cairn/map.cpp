@@ -10,7 +10,6 @@
 #include <boost/json/array.hpp>
 #include <boost/json/object.hpp>
 
-#include "arguments.hpp"
 #include "cairn/exploration/map_log.hpp"
 #include "cairn/exploration/map_truth.hpp"
 #include "cairn/grid/grid_format.hpp"
@@ -41,6 +40,38 @@ struct MapOptions {
       .registration = "icp:most_conflict=0.1"};
   std::string loss = "cauchy:scale=2";
   MapLogOptions run;
+
+  static auto fields() {
+    using O = MapOptions;
+    return OptionFields<O>()
+        .text("log", &O::log, "a log of CARMEN: robot.clf, robot.clf.gz:range=15")
+        .positional()
+        .placeholder("LOG")
+        .required()
+        .text("output", &O::output, "write the map: map.yaml")
+        .letter('o')
+        .placeholder("OUT")
+        .text("graph", &O::graph, "write the graph of the poses that are kept")
+        .placeholder("FILE")
+        .text("trajectory", &O::trajectory, "write all poses, those left out put back")
+        .placeholder("FILE")
+        .part(
+            &O::run,
+            OptionFields<MapLogOptions>()
+                .real("step", &MapLogOptions::step, 0.0, 1000.0, "take a scan after so many metres")
+                .placeholder("M")
+                .real("turn", &MapLogOptions::turn, 0.0, 3.0, "or after such a turn [rad]")
+                .placeholder("RAD")
+                .part(&MapLogOptions::odometry,
+                      OptionFields<OdometryModel>()
+                          .real("odometry_error", &OdometryModel::relative, 0.0, 1.0,
+                                "standard deviation of odometry, as a part of the motion; "
+                                "corrected by matches")
+                          .placeholder("PART")))
+        .component("loss", &O::loss, {"loss"},
+                   "robust loss of loop closures, such as cauchy:scale=2, or none")
+        .part(&O::slam);
+  }
 };
 
 struct MapOutcome {
@@ -228,40 +259,12 @@ int run_map(const MapOptions& options, Session& session) {
 
 }  // namespace
 
-Command add_map(ArgumentParser program) {
-  auto options = std::make_shared<MapOptions>();  // lives as long as the parser and the run
-  ArgumentParser cli =
-      program.add_command("map", "the map of a floor from a log of laser scans and odometry");
-  cli.add_option("log", options->log, "a log of CARMEN: robot.clf, robot.clf.gz:range=15")
-      .type_name("LOG")
-      .required();
-  cli.add_option("-o,--output", options->output, "write the map: map.yaml").type_name("OUT");
-  cli.add_option("--graph", options->graph, "write the graph of the poses that are kept")
-      .type_name("FILE");
-  cli.add_option("--trajectory", options->trajectory, "write all poses, those left out put back")
-      .type_name("FILE");
-  cli.add_option("--step", options->run.step, "take a scan after so many metres")
-      .type_name("M")
-      .within(0.0, 1000.0)
-      .show_default();
-  cli.add_option("--turn", options->run.turn, "or after such a turn [rad]")
-      .type_name("RAD")
-      .within(0.0, 3.0)
-      .show_default();
-  cli.add_option("--odometry-error", options->run.odometry.relative,
-                 "standard deviation of odometry, as a part of the motion; corrected by matches")
-      .type_name("PART")
-      .within(0.0, 1.0)
-      .show_default();
-  cli.add_option("--loss", options->loss,
-                 "robust loss of loop closures, such as cauchy:scale=2, or none")
-      .component({"loss"})
-      .show_default();
-  add_slam_options(cli, options->slam);
-  cli.footer(
-      "Example:\n"
-      "  cairn map robot.clf.gz -o map.yaml --graph robot.g2o");
-  return {cli, [options](Session& session) { return run_map(*options, session); }};
+Command map_command() {
+  return make_command<MapOptions>("map",
+                                  "the map of a floor from a log of laser scans and odometry",
+                                  "Example:\n"
+                                  "  cairn map robot.clf.gz -o map.yaml --graph robot.g2o",
+                                  run_map);
 }
 
 }  // namespace cairn::app

@@ -12,7 +12,6 @@
 
 #include <fmt/core.h>
 
-#include "arguments.hpp"
 #include "cairn/geometry/pose.hpp"
 #include "cairn/information/graph_information.hpp"
 #include "cairn/io/format.hpp"
@@ -54,6 +53,38 @@ struct MarginalsOptions {
   std::vector<std::string> pairs;   ///< "A:B"
   std::string column;               ///< an id, "last", or empty
   std::vector<std::string> mutual;  ///< "A:B", each an id or several as "A+B"
+
+  static auto fields() {
+    using O = MarginalsOptions;
+    return OptionFields<O>()
+        .text("graph", &O::graph, kGraphHelp)
+        .positional()
+        .placeholder("GRAPH")
+        .or_generated_by({"generator"})
+        .required()
+        .boolean("diagonal", &O::diagonal,
+                 "the block of every variable; what is done if nothing else is asked for")
+        .text("pairs", &O::pairs, "the blocks of these pairs of ids")
+        .placeholder("A:B,…")
+        .separated_by(',')
+        .text("column", &O::column, "the blocks of all variables with this id, or last")
+        .placeholder("ID")
+        .text("mutual_information", &O::mutual,
+              "of these pairs of ids, or of sets of ids as A+B:C+D, in nats")
+        .placeholder("A:B,…")
+        .separated_by(',')
+        .text("output", &O::output, "write the blocks as text (- is standard output)")
+        .letter('o')
+        .placeholder("FILE")
+        .boolean("as_given", &O::as_given,
+                 "at the states as they are, or as --initial puts them: do not optimise")
+        .component("optimizer", &O::optimizer, {"optimizer"},
+                   "the optimizer that finds the estimate")
+        .component("linear_solver", &O::linear_solver, {"linear_solver"},
+                   "solves H x = g, and gives the covariances")
+        .part(&O::problem)
+        .part(&O::input);
+  }
 };
 
 /// What is asked for, by variables of the graph.
@@ -549,46 +580,15 @@ int run(MarginalsOptions options, Session& session) {
 
 }  // namespace
 
-Command add_marginals(ArgumentParser program) {
-  auto options = std::make_shared<MarginalsOptions>();  // lives as long as the parser and the run
-  ArgumentParser cli = program.add_command("marginals", "how certain an estimate is: covariances");
-  cli.add_option("graph", options->graph, kGraphHelp)
-      .type_name("GRAPH")
-      .file_or_generated({"generator"})
-      .required();
-  cli.add_flag("--diagonal", options->diagonal,
-               "the block of every variable; what is done if nothing else is asked for");
-  cli.add_option("--pairs", options->pairs, "the blocks of these pairs of ids")
-      .type_name("A:B,…")
-      .separated_by(',')
-      .repeatable();
-  cli.add_option("--column", options->column, "the blocks of all variables with this id, or last")
-      .type_name("ID");
-  cli.add_option("--mutual-information", options->mutual,
-                 "of these pairs of ids, or of sets of ids as A+B:C+D, in nats")
-      .type_name("A:B,…")
-      .separated_by(',')
-      .repeatable();
-  cli.add_option("-o,--output", options->output, "write the blocks as text (- is standard output)")
-      .type_name("FILE");
-  cli.add_flag("--as-given", options->as_given,
-               "at the states as they are, or as --initial puts them: do not optimise");
-  cli.add_option("--optimizer", options->optimizer, "the optimizer that finds the estimate")
-      .component({"optimizer"})
-      .show_default();
-  cli.add_option("--linear-solver", options->linear_solver,
-                 "solves H x = g, and gives the covariances")
-      .component({"linear_solver"})
-      .show_default();
-  add_problem_options(cli, options->problem);
-  add_input_options(cli, options->input);
-  cli.footer(
+Command marginals_command() {
+  return make_command<MarginalsOptions>(
+      "marginals", "how certain an estimate is: covariances",
       "Covariances are of the step that moves a state, for a pose x exp(d): metres along its own\n"
       "axes, then radians. Variables that are fixed, or anchored, have zeros.\n"
       "Example:\n"
       "  cairn marginals city.g2o --column last --pairs 17:350,17:351 -o city.cov\n"
-      "  cairn marginals city.g2o --mutual-information 17:350,17+18:350+351");
-  return {cli, [options](Session& session) { return run(*options, session); }};
+      "  cairn marginals city.g2o --mutual-information 17:350,17+18:350+351",
+      run);
 }
 
 }  // namespace cairn::app

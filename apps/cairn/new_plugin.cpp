@@ -20,7 +20,6 @@
 #include <boost/json/array.hpp>
 #include <boost/json/object.hpp>
 
-#include "arguments.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
@@ -202,18 +201,43 @@ class UnfinishedFolder {
 struct Chosen {
   std::string name;
   std::string folder;
-  std::array<bool, kKinds.size()> kinds{};
+  bool factor = false, variable = false, loss = false, linear_solver = false, optimizer = false,
+       estimator = false, format = false, policy = false;
+
+  static auto fields() {
+    using O = Chosen;
+    return OptionFields<O>()
+        .text("name", &O::name, "of the plugin and its files: a-z, 0-9 and _")
+        .positional()
+        .placeholder("NAME")
+        .required()
+        .boolean("factor", &O::factor, "a measurement between variables")
+        .boolean("variable", &O::variable, "a type of states, with a factor on it")
+        .boolean("loss", &O::loss, "a robust loss, with an option")
+        .boolean("linear_solver", &O::linear_solver, "a solver of H x = g")
+        .boolean("optimizer", &O::optimizer, "a way to the minimum of chi2")
+        .boolean("estimator", &O::estimator, "an estimate that follows a growing graph")
+        .boolean("format", &O::format, "a text format, read and written")
+        .boolean("policy", &O::policy, "a choice of the poses and links that are kept")
+        .text("folder", &O::folder, "where it is written; must not exist [NAME]")
+        .placeholder("FOLDER");
+  }
 };
 
+/// In the order of `kKinds`.
+constexpr std::array kFlags{&Chosen::factor,        &Chosen::variable,  &Chosen::loss,
+                            &Chosen::linear_solver, &Chosen::optimizer, &Chosen::estimator,
+                            &Chosen::format,        &Chosen::policy};
+
 const Kind& kind_of(const Chosen& chosen) {
-  if (std::ranges::count(chosen.kinds, true) != 1) {
+  const auto is_chosen = [&](bool Chosen::*flag) { return chosen.*flag; };
+  if (std::ranges::count_if(kFlags, is_chosen) != 1) {
     std::string all;
     for (const Kind& kind : kKinds)
       all += fmt::format("{}--{}", all.empty() ? "" : ", ", kind.option);
     throw Error(ErrorCode::usage, fmt::format("one kind of plugin must be given: {}", all));
   }
-  return kKinds[static_cast<std::size_t>(std::ranges::find(chosen.kinds, true) -
-                                         chosen.kinds.begin())];
+  return kKinds[static_cast<std::size_t>(std::ranges::find_if(kFlags, is_chosen) - kFlags.begin())];
 }
 
 /// Of two components of one name neither could be used.
@@ -277,27 +301,14 @@ int make_project(const Chosen& chosen, Session& session) {
 
 }  // namespace
 
-Command add_new_plugin(ArgumentParser program) {
-  auto chosen = std::make_shared<Chosen>();  // lives as long as the parser and the run
-  ArgumentParser cli = program.add_command("new-plugin", "a project to begin a plugin with");
-  cli.add_option("name", chosen->name, "of the plugin and its files: a-z, 0-9 and _")
-      .type_name("NAME")
-      .required();
-  constexpr std::array<const char*, kKinds.size()> help{
-      "a measurement between variables", "a type of states, with a factor on it",
-      "a robust loss, with an option",   "a solver of H x = g",
-      "a way to the minimum of chi2",    "an estimate that follows a growing graph",
-      "a text format, read and written", "a choice of the poses and links that are kept"};
-  for (std::size_t k = 0; k < kKinds.size(); ++k)
-    cli.add_flag(fmt::format("--{}", kKinds[k].option), chosen->kinds[k], help[k]);
-  cli.add_option("--folder", chosen->folder, "where it is written; must not exist [NAME]")
-      .type_name("FOLDER");
-  cli.footer(
+Command new_plugin_command() {
+  return make_command<Chosen>(
+      "new-plugin", "a project to begin a plugin with",
       "It builds against the installed cairn, works as it is, and passes its own tests, which run "
       "the\nconformance suite (cairn plugins --check).\n\n"
       "Example:\n"
-      "  cairn new-plugin laser_range --factor");
-  return {cli, [chosen](Session& session) { return make_project(*chosen, session); }};
+      "  cairn new-plugin laser_range --factor",
+      make_project);
 }
 
 }  // namespace cairn::app

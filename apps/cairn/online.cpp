@@ -10,7 +10,6 @@
 #include <fmt/core.h>
 #include <boost/crc.hpp>
 
-#include "arguments.hpp"
 #include "cairn/evaluation/plausibility.hpp"
 #include "cairn/evaluation/undetermined.hpp"
 #include "cairn/io/format.hpp"
@@ -68,7 +67,56 @@ struct OnlineOptions {
   std::string trajectory;
   ProblemOptions problem;
 
-  OnlineOptions() { problem.initial.clear(); }
+  OnlineOptions() {
+    problem.initial.clear();
+    input.format = "g2o";
+  }
+
+  static auto fields() {
+    using O = OnlineOptions;
+    return OptionFields<O>()
+        .component("estimator", &O::estimator, {"estimator"},
+                   "the estimator, with options as NAME:key=value [incremental_cholesky]")
+        .component("policy", &O::policy, {"pose_policy"},
+                   "decides which poses are kept, such as compact_pose; default: all are")
+        .text("thresholds", &O::thresholds, "with --policy, take its thresholds from a file")
+        .placeholder("FILE")
+        .text("map", &O::map, "with --policy, continue this map; where on it is unknown at first")
+        .placeholder("MAP")
+        .choice("solve", &O::solve, {"auto", "explicit"},
+                "auto, after every measurement, or explicit: by SOLVE")
+        .placeholder("WHEN")
+        .choice("output", &O::estimates, {"none", "last", "changed", "all"},
+                "estimates written after a solve: none, last, changed or all")
+        .choice("marginals", &O::marginals, {"none", "last", "diagonal"},
+                "covariances kept, and written after a solve: none, last or diagonal")
+        .real("budget", &O::budget, 0.0, 1e9, "seconds that an update may take; 0: no limit")
+        .placeholder("S")
+        .integer("keep", &O::keep, 2, 1e9,
+                 "keep so many poses: others are sparsified as new ones come; 0: all, or those "
+                 "that --policy keeps")
+        .or_zero()
+        .component("select", &O::select, {"node_selection"},
+                   "which poses leave: nearest, oldest, smallest_blanket, least_loss [nearest]")
+        .component("sparsifier", &O::sparsifier, {"sparsifier"},
+                   "what replaces poses that leave by factors, with options as NAME:key=value")
+        .text("listen", &O::listen,
+              "serve many clients at this Unix domain socket, of which one writes")
+        .placeholder("SOCKET")
+        .text("journal", &O::journal, "restore the session from this journal, and append to it")
+        .placeholder("FILE")
+        .choice("sync", &O::sync, {"every", "batch", "none"},
+                "sync of the journal to disk: every line, batch or none")
+        .placeholder("WHEN")
+        .text("save", &O::output, "write the last estimate as a graph at the end")
+        .letter('o')
+        .placeholder("OUT")
+        .text("trajectory", &O::trajectory,
+              "with --policy, write all poses at the end, and estimate those left out")
+        .placeholder("FILE")
+        .part(&O::problem, ProblemOptions::loss_fields())
+        .part(&O::input);
+  }
 };
 
 /// What must be the same for a journal to give the same estimate again.
@@ -461,79 +509,17 @@ int run(OnlineOptions options, Session& session) {
 
 }  // namespace
 
-Command add_online(ArgumentParser program) {
-  auto options = std::make_shared<OnlineOptions>();  // lives as long as the parser and the run
-  options->input.format = "g2o";
-  ArgumentParser cli =
-      program.add_command("online", "estimate from standard input while measurements arrive");
-  cli.add_option("--estimator", options->estimator, "the estimator, with options as NAME:key=value")
-      .component({"estimator"})
-      .show_default(kDefaultEstimator);
-  cli.add_option("--policy", options->policy,
-                 "decides which poses are kept, such as compact_pose; default: all are")
-      .component({"pose_policy"});
-  cli.add_option("--thresholds", options->thresholds,
-                 "with --policy, take its thresholds from a file")
-      .type_name("FILE");
-  cli.add_option("--map", options->map,
-                 "with --policy, continue this map; where on it is unknown at first")
-      .type_name("MAP");
-  cli.add_option("--solve", options->solve, "auto, after every measurement, or explicit: by SOLVE")
-      .type_name("WHEN")
-      .one_of({"auto", "explicit"})
-      .show_default();
-  cli.add_option("--output", options->estimates,
-                 "estimates written after a solve: none, last, changed or all")
-      .type_name("WHICH")
-      .one_of({"none", "last", "changed", "all"})
-      .show_default();
-  cli.add_option("--marginals", options->marginals,
-                 "covariances kept, and written after a solve: none, last or diagonal")
-      .type_name("WHICH")
-      .one_of({"none", "last", "diagonal"})
-      .show_default();
-  cli.add_option("--budget", options->budget, "seconds that an update may take; 0: no limit")
-      .type_name("S")
-      .within(0.0, 1e9)
-      .show_default("0");
-  cli.add_option("--keep", options->keep,
-                 "keep so many poses: others are sparsified as new ones come; 0: all, or those "
-                 "that --policy keeps")
-      .type_name("N")
-      .none_or_within(2, 1000000000)
-      .show_default();
-  cli.add_option("--select", options->select,
-                 "which poses leave: nearest, oldest, smallest_blanket, least_loss [nearest]")
-      .component({"node_selection"});
-  cli.add_option("--sparsifier", options->sparsifier,
-                 "what replaces poses that leave by factors, with options as NAME:key=value")
-      .component({"sparsifier"});
-  cli.add_option("--listen", options->listen,
-                 "serve many clients at this Unix domain socket, of which one writes")
-      .type_name("SOCKET");
-  cli.add_option("--journal", options->journal,
-                 "restore the session from this journal, and append to it")
-      .type_name("FILE");
-  cli.add_option("--sync", options->sync, "sync of the journal to disk: every line, batch or none")
-      .type_name("WHEN")
-      .one_of({"every", "batch", "none"})
-      .show_default();
-  cli.add_option("-o,--save", options->output, "write the last estimate as a graph at the end")
-      .type_name("OUT");
-  cli.add_option("--trajectory", options->trajectory,
-                 "with --policy, write all poses at the end, and estimate those left out")
-      .type_name("FILE");
-  add_loss_options(cli, options->problem);
-  add_input_options(cli, options->input);
-  cli.footer(
+Command online_command() {
+  return make_command<OnlineOptions>(
+      "online", "estimate from standard input while measurements arrive",
       "Lines are those of g2o files and SOLVE, FULL, NEW, REMOVE, CHANGE, MARGINALIZE, SPARSIFY,\n"
       "COVARIANCE, ESTIMATE, CHI2, SAVE, HELP and QUIT; with --policy NEXT, NOMATCH and DONE; "
       "with\n"
       "--listen WRITE, FOLLOW and JSON: docs/online.md.\n\n"
       "Example:\n"
       "  robot | cairn online --marginals last --journal today.journal\n"
-      "  cairn online --listen /run/cairn/robot.socket --journal today.journal -o map.g2o");
-  return {cli, [options](Session& session) { return run(*options, session); }};
+      "  cairn online --listen /run/cairn/robot.socket --journal today.journal -o map.g2o",
+      run);
 }
 
 }  // namespace cairn::app

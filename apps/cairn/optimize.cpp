@@ -10,7 +10,6 @@
 
 #include <fmt/core.h>
 
-#include "arguments.hpp"
 #include "cairn/io/losses_not_written.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/report/recording.hpp"
@@ -44,6 +43,32 @@ struct OptimizeOptions {
   std::string linear_solver;  ///< empty: not given
   std::string covariance = "none";
   std::string record;  ///< file for the recording, or empty
+
+  static auto fields() {
+    using O = OptimizeOptions;
+    return OptionFields<O>()
+        .text("graph", &O::graph, kGraphHelp)
+        .positional()
+        .placeholder("GRAPH")
+        .or_generated_by({"generator"})
+        .required()
+        .text("output", &O::output, "write the estimate (- is standard output)")
+        .letter('o')
+        .placeholder("OUT")
+        .component("to", &O::output_format, {"format"}, "format of OUT, instead of by the ending")
+        .placeholder("FORMAT")
+        .component("optimizer", &O::optimizer, {"optimizer"},
+                   "the optimizer, with options as NAME:key=value")
+        .component("linear_solver", &O::linear_solver, {"linear_solver"},
+                   "solves H x = g in each step [block_cholesky]")
+        .part(&O::problem)
+        .part(&O::problem, ProblemOptions::limit_fields())
+        .text("record", &O::record, "every iteration's positions, for cairn view")
+        .placeholder("FILE")
+        .choice("covariance", &O::covariance, {"blocks", "none"},
+                "blocks of every variable, in the report, or none")
+        .part(&O::input);
+  }
 };
 
 void check(const OptimizeOptions& options, Session& session) {
@@ -220,42 +245,16 @@ int run(const OptimizeOptions& options, Session& session) {
 
 }  // namespace
 
-Command add_optimize(ArgumentParser program) {
-  auto options = std::make_shared<OptimizeOptions>();  // lives as long as the parser and the run
-  ArgumentParser cli = program.add_command("optimize", "find the best estimate of a graph");
-  cli.add_option("graph", options->graph, kGraphHelp)
-      .type_name("GRAPH")
-      .file_or_generated({"generator"})
-      .required();
-  cli.add_option("-o,--output", options->output, "write the estimate (- is standard output)")
-      .type_name("OUT");
-  cli.add_option("--to", options->output_format, "format of OUT, instead of by the ending")
-      .component({"format"})
-      .type_name("FORMAT");
-  cli.add_option("--optimizer", options->optimizer, "the optimizer, with options as NAME:key=value")
-      .component({"optimizer"})
-      .show_default();
-  cli.add_option("--linear-solver", options->linear_solver, "solves H x = g in each step")
-      .component({"linear_solver"})
-      .show_default(kDefaultLinearSolver);
-  add_problem_options(cli, options->problem);
-  add_time_limit(cli, options->problem.stop);
-  cli.add_option("--record", options->record, "every iteration's positions, for cairn view")
-      .type_name("FILE");
-  cli.add_option("--covariance", options->covariance,
-                 "blocks of every variable, in the report, or none")
-      .type_name("WHICH")
-      .one_of({"blocks", "none"})
-      .show_default();
-  add_input_options(cli, options->input);
-  cli.footer(
+Command optimize_command() {
+  return make_command<OptimizeOptions>(
+      "optimize", "find the best estimate of a graph",
       "Example:\n"
       "  cairn optimize city.g2o -o best.g2o --linear-solver cholmod:ordering=metis --json "
       "run.json\n"
       "  cairn optimize @manhattan:poses=1000 --initial chordal --loss huber --loss-on loops\n"
       "Ctrl-C stops with the best estimate written. Names: cairn plugins; options: cairn plugins "
-      "NAME");
-  return {cli, [options](Session& session) { return run(*options, session); }};
+      "NAME",
+      run);
 }
 
 }  // namespace cairn::app

@@ -11,7 +11,6 @@
 #include <fmt/core.h>
 
 #include "album.hpp"
-#include "arguments.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
@@ -33,12 +32,57 @@ struct PlotOptions {
   std::string colour = "class";
   bool poses = false;
   double ellipses = 0.0;
-  int decision = 0;
+  std::optional<std::int64_t> decision;
   std::string x;
   std::vector<std::string> y;
   std::optional<double> x_max;
   std::string logarithmic = "none";
   std::string linear_solver = "block_cholesky";
+
+  static auto fields() {
+    using O = PlotOptions;
+    constexpr double kAny = std::numeric_limits<double>::infinity();
+    return OptionFields<O>()
+        .part(&O::album,
+              AlbumOptions::fields("graph, @KIND, trajectory, recording, CSV, JSON of optimize, "
+                                   "bench, replay"))
+        .text("output", &O::output, "the plot: .svg, .png or .pdf [name of the first FILE, .svg]")
+        .letter('o')
+        .placeholder("PICTURE")
+        .choice("what", &O::what,
+                {"auto", "trajectory", "convergence", "bars", "scaling", "sparsity", "steps",
+                 "columns", "map"},
+                "trajectory, convergence, bars, scaling, sparsity, steps, columns, map; auto: by "
+                "FILE")
+        .placeholder("WHAT")
+        .text("size", &O::size, "WIDTHxHEIGHT [px; in a PDF 1/96 inch] [900x600]")
+        .placeholder("SIZE")
+        .choice("theme", &O::theme, {"light", "dark"}, "light or dark")
+        .placeholder("THEME")
+        .choice("colour", &O::colour, {"class", "residual"}, "of edges: by class or by residual")
+        .placeholder("BY")
+        .boolean("poses", &O::poses, "mark each pose of a trajectory")
+        .real("ellipses", &O::ellipses, 0.0, 1000.0,
+              "covariances [σ], of optimize --covariance blocks; on maps the robot's")
+        .placeholder("SIGMAS")
+        .integer("decision", &O::decision, 1, 2147483647,
+                 "of a map: at this decision, with what was to choose from [the end]")
+        .part(&O::album, OptionFields<AlbumOptions>().boolean(
+                             "apart", &AlbumOptions::apart,
+                             "each graph beside the others, not one over the other"))
+        .text("x", &O::x,
+              "of convergence: iterations or time [iterations]; of CSV: a column [first]")
+        .placeholder("AXIS")
+        .text("y", &O::y, "columns, such as 'chi2' or 'seconds*': each --y is a chart [all in one]")
+        .placeholder("COLUMNS")
+        .real("x_max", &O::x_max, -kAny, kAny,
+              "right end of a plot of columns: rows beyond are left out")
+        .choice("log", &O::logarithmic, {"none", "x", "y", "xy"},
+                "logarithmic axes of a plot of columns")
+        .placeholder("AXES")
+        .component("linear_solver", &O::linear_solver, {"linear_solver"},
+                   "its elimination order gives the sparsity of L");
+  }
 };
 
 /// "900x600" as two options.
@@ -78,7 +122,7 @@ std::string output_of(const PlotOptions& options, Session& session) {
 }
 
 void check_columns(const PlotOptions& options) {
-  if (options.decision > 0 && options.what != "map")
+  if (options.decision && options.what != "map")
     throw Error(ErrorCode::usage, "--decision is for --what map");
   if (options.what == "map" &&
       (!options.x.empty() || !options.y.empty() || options.x_max || options.logarithmic != "none"))
@@ -111,7 +155,7 @@ ComponentSpec picture_spec(const PlotOptions& options, const std::string& output
   picture.values["x"] = options.x;
   picture.values["y_columns"] = joined(options.y, "\n");
   picture.values["logarithmic"] = options.logarithmic;
-  picture.values["decision"] = fmt::format("{}", options.decision);
+  picture.values["decision"] = fmt::format("{}", options.decision.value_or(0));
   if (options.x_max) picture.values["x_max"] = fmt::format("{}", *options.x_max);
   put_size(options.size, picture);
   return picture;
@@ -144,68 +188,16 @@ int run(const PlotOptions& options, Session& session) {
 
 }  // namespace
 
-Command add_plot(ArgumentParser program) {
-  auto options = std::make_shared<PlotOptions>();  // lives as long as the parser and the run
-  ArgumentParser cli = program.add_command("plot", "a static plot: SVG, PNG or PDF");
-  add_album_options(cli, options->album,
-                    "graph, @KIND, trajectory, recording, CSV, JSON of optimize, bench, replay");
-  cli.add_option("-o,--output", options->output,
-                 "the plot: .svg, .png or .pdf [name of the first FILE, .svg]")
-      .type_name("PICTURE");
-  cli.add_option("--what", options->what,
-                 "trajectory, convergence, bars, scaling, sparsity, steps, columns, map; auto: by "
-                 "FILE")
-      .type_name("WHAT")
-      .one_of({"auto", "trajectory", "convergence", "bars", "scaling", "sparsity", "steps",
-               "columns", "map"})
-      .show_default();
-  cli.add_option("--size", options->size, "WIDTHxHEIGHT [px; in a PDF 1/96 inch] [900x600]")
-      .type_name("SIZE");
-  cli.add_option("--theme", options->theme, "light or dark")
-      .type_name("THEME")
-      .one_of({"light", "dark"})
-      .show_default();
-  cli.add_option("--colour", options->colour, "of edges: by class or by residual")
-      .type_name("BY")
-      .one_of({"class", "residual"})
-      .show_default();
-  cli.add_flag("--poses", options->poses, "mark each pose of a trajectory");
-  cli.add_option("--ellipses", options->ellipses,
-                 "covariances [σ], of optimize --covariance blocks; on maps the robot's")
-      .type_name("SIGMAS")
-      .within(0.0, 1000.0);
-  cli.add_option("--decision", options->decision,
-                 "of a map: at this decision, with what was to choose from [the end]")
-      .type_name("N")
-      .within(1, 2147483647);
-  cli.add_flag("--apart", options->album.apart,
-               "each graph beside the others, not one over the other");
-  cli.add_option("--x", options->x,
-                 "of convergence: iterations or time [iterations]; of CSV: a column [first]")
-      .type_name("AXIS");
-  cli.add_option("--y", options->y,
-                 "columns, such as 'chi2' or 'seconds*': each --y is a chart [all in one]")
-      .type_name("COLUMNS")
-      .repeatable();
-  cli.add_option("--x-max", options->x_max,
-                 "right end of a plot of columns: rows beyond are left out")
-      .type_name("X");
-  cli.add_option("--log", options->logarithmic, "logarithmic axes of a plot of columns")
-      .type_name("AXES")
-      .one_of({"none", "x", "y", "xy"})
-      .show_default();
-  cli.add_option("--linear-solver", options->linear_solver,
-                 "its elimination order gives the sparsity of L")
-      .component({"linear_solver"})
-      .show_default();
-  cli.footer(
+Command plot_command() {
+  return make_command<PlotOptions>(
+      "plot", "a static plot: SVG, PNG or PDF",
       "Example:\n"
       "  cairn plot city.g2o best.g2o --truth truth.g2o -o city.svg\n"
       "  cairn plot run1.json run2.json --what convergence --x time -o curves.pdf\n"
       "  cairn plot robot.jsonl --what map --decision 40 -o robot.png\n"
       "  cairn plot @sphere --what sparsity --linear-solver block_cholesky:ordering=natural -o "
-      "L.png");
-  return {cli, [options](Session& session) { return run(*options, session); }};
+      "L.png",
+      run);
 }
 
 }  // namespace cairn::app

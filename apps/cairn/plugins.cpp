@@ -12,7 +12,6 @@
 
 #include <fmt/core.h>
 
-#include "arguments.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/io/generator.hpp"
 #include "cairn/linear/iterative_solver.hpp"
@@ -313,31 +312,50 @@ int show(const std::string& name, Session& session) {
   return 0;
 }
 
+struct PluginsOptions {
+  std::string name;
+  PluginCheckOptions check;
+
+  static auto fields() {
+    using O = PluginsOptions;
+    using Check = PluginCheckOptions;
+    return OptionFields<O>()
+        .component("name", &O::name, {},
+                   "a solver, type, format …: its options, abilities and limits; a kind: what it "
+                   "has")
+        .positional()
+        .part(&O::check,
+              OptionFields<Check>()
+                  .text("check", &Check::files,
+                        "run the conformance suite over these plugins, in child processes")
+                  .placeholder("FILE...")
+                  .takes_words()
+                  .real("seconds", &Check::seconds, 0.1, 1e9,
+                        "with --check, how long a group of checks may take")
+                  .placeholder("S")
+                  .integer("seed", &Check::seed, 0, kMostSeed,
+                           "with --check, the seed of the random inputs"));
+  }
+};
+
+int run(const PluginsOptions& options, Session& session) {
+  if (!options.check.files.empty()) {
+    if (!options.name.empty()) {
+      throw Error(
+          ErrorCode::usage,
+          fmt::format("'{}' and --check are two questions; ask one at a time", options.name));
+    }
+    return check_plugins(options.check, session);
+  }
+  return options.name.empty() ? list(session.registry().offers(), session)
+                              : show(options.name, session);
+}
+
 }  // namespace
 
-Command add_plugins(ArgumentParser program) {
-  struct Chosen {
-    std::string name;
-    PluginCheckOptions check;
-  };
-  auto chosen = std::make_shared<Chosen>();  // lives as long as the parser and the run
-  ArgumentParser cli =
-      program.add_command("plugins", "what is on offer, one name's options, or checks of a plugin");
-  cli.add_option("name", chosen->name,
-                 "a solver, type, format …: its options, abilities and limits; a kind: what it has")
-      .component({});
-  cli.add_option("--check", chosen->check.files,
-                 "run the conformance suite over these plugins, in child processes")
-      .type_name("FILE...");
-  cli.add_option("--seconds", chosen->check.seconds,
-                 "with --check, how long a group of checks may take")
-      .type_name("S")
-      .seconds_from(0.1)
-      .show_default();
-  cli.add_option("--seed", chosen->check.seed, "with --check, the seed of the random inputs")
-      .type_name("N")
-      .show_default();
-  cli.footer(
+Command plugins_command() {
+  return make_command<PluginsOptions>(
+      "plugins", "what is on offer, one name's options, or checks of a plugin",
       "Plugins are found by --plugin, CAIRN_PLUGIN_PATH, in the user's folder (cairn/plugins "
       "below\n"
       "XDG_DATA_HOME or ~/.local/share), and in the folder cairn beside the core library. A "
@@ -347,19 +365,8 @@ Command add_plugins(ArgumentParser program) {
       "not hold, or nothing was found.\n\n"
       "Example:\n"
       "  cairn plugins cholmod\n"
-      "  cairn plugins --check build/range.so");
-  return {cli, [chosen](Session& session) {
-            if (!chosen->check.files.empty()) {
-              if (!chosen->name.empty()) {
-                throw Error(ErrorCode::usage,
-                            fmt::format("'{}' and --check are two questions; ask one at a time",
-                                        chosen->name));
-              }
-              return check_plugins(chosen->check, session);
-            }
-            return chosen->name.empty() ? list(session.registry().offers(), session)
-                                        : show(chosen->name, session);
-          }};
+      "  cairn plugins --check build/range.so",
+      run);
 }
 
 }  // namespace cairn::app

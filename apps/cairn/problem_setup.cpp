@@ -7,7 +7,6 @@
 
 #include <fmt/core.h>
 
-#include "arguments.hpp"
 #include "cairn/evaluation/optimization.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "interrupt.hpp"
@@ -15,41 +14,42 @@
 
 namespace cairn::app {
 
-void add_loss_options(ArgumentParser cli, ProblemOptions& options) {
-  cli.add_option("--loss", options.loss, "robust loss, such as huber:scale=1 [none]")
-      .component({"loss"});
-  cli.add_option("--loss-on", options.loss_on,
-                 "factors that the loss applies to: all, loops, or those of a type by its tag")
-      .type_name("WHICH")
-      .suggest({"all", "loops"})
-      .show_default();
+OptionFields<ProblemOptions> ProblemOptions::loss_fields() {
+  return OptionFields<ProblemOptions>()
+      .component("loss", &ProblemOptions::loss, {"loss"},
+                 "robust loss, such as huber:scale=1 [none]")
+      .text("loss_on", &ProblemOptions::loss_on,
+            "factors that the loss applies to: all, loops, or those of a type by its tag")
+      .placeholder("WHICH")
+      .suggest({"all", "loops"});
+}
+
+OptionFields<ProblemOptions> ProblemOptions::fields() {
+  return OptionFields<ProblemOptions>()
+      .component("initial", &ProblemOptions::initial, {"initial_guess"},
+                 "initial estimate: a name of kind initial_guess")
+      .all_of(loss_fields())
+      .part(
+          &ProblemOptions::stop,
+          OptionFields<Stop>()
+              .integer("iterations", &Stop::max_iterations, 0, 1e9, "maximum number of iterations")
+              .real("tolerance", &Stop::tolerance, 0.0, 1.0,
+                    "stop when a step could lower chi2 by less than this fraction; 0: exactly N "
+                    "times")
+              .placeholder("T"));
+}
+
+OptionFields<ProblemOptions> ProblemOptions::limit_fields() {
+  return OptionFields<ProblemOptions>().part(
+      &ProblemOptions::stop,
+      OptionFields<Stop>()
+          .real("max_seconds", &Stop::max_seconds, 0.0, 1e9,
+                "stop a run that takes longer, with its best estimate; 0: no limit")
+          .placeholder("S"));
 }
 
 void keep_states(ProblemOptions& options) {
   if (options.initial == ProblemOptions().initial) options.initial.clear();
-}
-
-void add_problem_options(ArgumentParser cli, ProblemOptions& options) {
-  cli.add_option("--initial", options.initial, "initial estimate: a name of kind initial_guess")
-      .component({"initial_guess"})
-      .show_default();
-  add_loss_options(cli, options);
-  cli.add_option("--iterations", options.stop.max_iterations, "maximum number of iterations")
-      .type_name("N")
-      .within(0, 1000000000)
-      .show_default();
-  cli.add_option("--tolerance", options.stop.tolerance,
-                 "stop when a step could lower chi2 by less than this fraction; 0: exactly N times")
-      .type_name("T")
-      .within(0.0, 1.0)
-      .show_default("1e-10");
-}
-
-void add_time_limit(ArgumentParser cli, Stop& stop) {
-  cli.add_option("--max-seconds", stop.max_seconds,
-                 "stop a run that takes longer, with its best estimate; 0: no limit [0]")
-      .type_name("S")
-      .within(0.0, 1e9);
 }
 
 ProblemSetup::ProblemSetup(const ProblemOptions& options, Registry& registry)

@@ -6,7 +6,6 @@
 #include <string_view>
 #include <vector>
 
-#include "arguments.hpp"
 #include "cairn/evaluation/watched_guess.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
@@ -28,14 +27,16 @@ struct ProblemOptions {
   std::string loss;              ///< empty: none
   std::string loss_on = "all";
   Stop stop;
+
+  /// Of commands that optimise a graph as it is read.
+  static OptionFields<ProblemOptions> fields();
+  /// The part of them that is about the loss.
+  static OptionFields<ProblemOptions> loss_fields();
+  /// --max-seconds, the limit of each run.
+  static OptionFields<ProblemOptions> limit_fields();
 };
 /// For --as-given: no initial guess, unless one is named.
 void keep_states(ProblemOptions& options);
-void add_problem_options(ArgumentParser cli, ProblemOptions& options);
-/// --max-seconds, the limit of each run.
-void add_time_limit(ArgumentParser cli, Stop& stop);
-/// The part of them that is about the loss.
-void add_loss_options(ArgumentParser cli, ProblemOptions& options);
 
 /// The initial guess and the loss that the options name; made before a graph is read, so that a
 /// wrong name is reported at once.

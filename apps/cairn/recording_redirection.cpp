@@ -10,7 +10,7 @@
 #include <fmt/core.h>
 
 #include "cairn/geometry/state_group.hpp"
-#include "cairn/online/recorded_graph.hpp"
+#include "cairn/update/recorded_graph.hpp"
 #include "cairn/runtime/error.hpp"
 
 namespace cairn::app {

@@ -11,12 +11,11 @@
 #include <fmt/core.h>
 #include <boost/json/object.hpp>
 
-#include "arguments.hpp"
 #include "cairn/evaluation/batch_comparison.hpp"
 #include "cairn/evaluation/plausibility.hpp"
 #include "cairn/evaluation/undetermined.hpp"
 #include "cairn/io/losses_not_written.hpp"
-#include "cairn/online/recorded_graph.hpp"
+#include "cairn/update/recorded_graph.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
@@ -266,70 +265,57 @@ int run(const ReplayOptions& options, Session& session) {
 
 }  // namespace
 
-Command add_replay(ArgumentParser program) {
-  auto options = std::make_shared<ReplayOptions>();  // lives as long as the parser and the run
-  ArgumentParser cli = program.add_command(
-      "replay", "feed a graph to an estimator in the order of its measurements");
-  cli.add_option("graph", options->graph, kGraphHelp)
-      .type_name("GRAPH")
-      .file_or_generated({"generator"})
-      .required();
-  cli.add_option("-o,--output", options->output, "write the last estimate (- is standard output)")
-      .type_name("OUT");
-  cli.add_option("--to", options->output_format, "format of OUT, instead of by the ending")
-      .component({"format"})
-      .type_name("FORMAT");
-  cli.add_option("--estimator", options->estimator, "the estimator, with options as NAME:key=value")
-      .component({"estimator"})
-      .show_default();
-  cli.add_option("--marginals", options->marginals, "covariances kept: none, last or diagonal")
-      .type_name("WHICH")
-      .one_of({"none", "last", "diagonal"})
-      .show_default();
-  cli.add_option("--initial", options->problem.initial,
-                 "new poses: odometry, from the estimate so far, or as_given in the file")
-      .type_name("HOW")
-      .one_of({"odometry", "as_given"})
-      .show_default();
-  cli.add_option("--solve-every", options->solve_every, "solve after every so many poses")
-      .type_name("N")
-      .within(1, 1000000000)
-      .show_default();
-  cli.add_option("--budget", options->budget, "seconds that an update may take; 0: no limit")
-      .type_name("S")
-      .within(0.0, 1e9)
-      .show_default("0");
-  cli.add_option("--keep", options->keep,
-                 "keep so many poses: others are sparsified as new ones come; 0: all")
-      .type_name("N")
-      .none_or_within(2, 1000000000)
-      .show_default();
-  cli.add_option("--select", options->select, "which poses leave with --keep")
-      .component({"node_selection"})
-      .show_default();
-  cli.add_option("--sparsifier", options->sparsifier, "what replaces them by factors")
-      .component({"sparsifier"})
-      .show_default();
-  cli.add_flag("--finish", options->finish, "relinearise and solve the last step to convergence");
-  cli.add_flag("--estimate", options->estimate, "count the time of reading all states, every step");
-  cli.add_option("--check", options->checks, "compare chi2 with batch at so many steps (not timed)")
-      .type_name("N")
-      .within(0, 1000000000)
-      .show_default();
-  cli.add_flag("--covariance-check", options->covariance_check,
-               "there, compare the covariances kept as well");
-  cli.add_option("--steps", options->steps, "a row of times and counts for each step, as CSV")
-      .type_name("FILE");
-  cli.add_option("--plot", options->plot, "draw the time of each step: .svg, .png or .pdf")
-      .type_name("FILE");
-  add_loss_options(cli, options->problem);
-  add_input_options(cli, options->input);
-  cli.footer(
+OptionFields<ReplayOptions> ReplayOptions::fields() {
+  using O = ReplayOptions;
+  return OptionFields<O>()
+      .text("graph", &O::graph, kGraphHelp)
+      .positional()
+      .placeholder("GRAPH")
+      .or_generated_by({"generator"})
+      .required()
+      .text("output", &O::output, "write the last estimate (- is standard output)")
+      .letter('o')
+      .placeholder("OUT")
+      .component("to", &O::output_format, {"format"}, "format of OUT, instead of by the ending")
+      .placeholder("FORMAT")
+      .component("estimator", &O::estimator, {"estimator"},
+                 "the estimator, with options as NAME:key=value")
+      .choice("marginals", &O::marginals, {"none", "last", "diagonal"},
+              "covariances kept: none, last or diagonal")
+      .part(&O::problem,
+            OptionFields<ProblemOptions>()
+                .choice("initial", &ProblemOptions::initial, {"odometry", "as_given"},
+                        "new poses: odometry, from the estimate so far, or as_given in the file")
+                .placeholder("HOW"))
+      .integer("solve_every", &O::solve_every, 1, 1e9, "solve after every so many poses")
+      .real("budget", &O::budget, 0.0, 1e9, "seconds that an update may take; 0: no limit")
+      .placeholder("S")
+      .integer("keep", &O::keep, 2, 1e9,
+               "keep so many poses: others are sparsified as new ones come; 0: all")
+      .or_zero()
+      .component("select", &O::select, {"node_selection"}, "which poses leave with --keep")
+      .component("sparsifier", &O::sparsifier, {"sparsifier"}, "what replaces them by factors")
+      .boolean("finish", &O::finish, "relinearise and solve the last step to convergence")
+      .boolean("estimate", &O::estimate, "count the time of reading all states, every step")
+      .integer("check", &O::checks, 0, 1e9, "compare chi2 with batch at so many steps (not timed)")
+      .boolean("covariance_check", &O::covariance_check,
+               "there, compare the covariances kept as well")
+      .text("steps", &O::steps, "a row of times and counts for each step, as CSV")
+      .placeholder("FILE")
+      .text("plot", &O::plot, "draw the time of each step: .svg, .png or .pdf")
+      .placeholder("FILE")
+      .part(&O::problem, ProblemOptions::loss_fields())
+      .part(&O::input);
+}
+
+Command replay_command() {
+  return make_command<ReplayOptions>(
+      "replay", "feed a graph to an estimator in the order of its measurements",
       "A step is a new pose with what it sees; files in another order are sorted first.\n\n"
       "Example:\n"
       "  cairn replay city.g2o --marginals diagonal --check 50 --steps steps.csv\n"
-      "  cairn replay city.g2o --estimator periodic_batch:every=50 --budget 0.005");
-  return {cli, [options](Session& session) { return run(*options, session); }};
+      "  cairn replay city.g2o --estimator periodic_batch:every=50 --budget 0.005",
+      run);
 }
 
 }  // namespace cairn::app

@@ -39,6 +39,8 @@ struct ReplayOptions {
   std::string plot;   ///< picture, or empty
 
   ReplayOptions() { problem.initial = "odometry"; }
+
+  static OptionFields<ReplayOptions> fields();
 };
 
 /// One update of the estimator.

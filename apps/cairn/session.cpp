@@ -43,6 +43,21 @@ void try_threads(int count) {
 
 }  // namespace
 
+OptionFields<CommonOptions> CommonOptions::fields() {
+  return OptionFields<CommonOptions>()
+      .text("json", &CommonOptions::json, "write a report as JSON; - is standard output")
+      .placeholder("FILE")
+      .integer("threads", &CommonOptions::threads, 0, kMostThreads,
+               "threads; 0 is all cores. Never changes a result")
+      .text("plugin", &CommonOptions::plugins, "load this plugin too (may be given repeatedly)")
+      .placeholder("FILE")
+      .component("types", &CommonOptions::types, {"types"},
+                 "options of types, such as slam3d:metric=g2o (repeatedly)")
+      .placeholder("NAME:K=V")
+      .boolean("quiet", &CommonOptions::quiet,
+               "no progress, and no notes but those that stand in results");
+}
+
 Session::Session() = default;
 Session::~Session() = default;
 

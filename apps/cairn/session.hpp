@@ -8,6 +8,7 @@
 
 #include <boost/json/fwd.hpp>
 
+#include "cairn/plugin/option_fields.hpp"
 #include "file_roles.hpp"
 
 namespace cairn {
@@ -23,6 +24,8 @@ struct CommonOptions {
   std::vector<std::string> plugins;  ///< shared objects to load besides those that are found
   std::vector<std::string> types;    ///< NAME:key=value
   bool quiet = false;
+
+  static OptionFields<CommonOptions> fields();
 };
 
 /// One run of the program: its common options, its registry and its two streams.

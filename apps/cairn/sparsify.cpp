@@ -12,7 +12,6 @@
 
 #include <fmt/core.h>
 
-#include "arguments.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/policy/policy_run.hpp"
 #include "cairn/runtime/error.hpp"
@@ -53,33 +52,33 @@ SparsifyJob job_of(const SparsifyCommandOptions& options, Session& session) {
     if (!value.empty()) job.sparsifier.values.insert_or_assign(name, value);
   }
   choose_recovery(job.sparsifier);
-  if (options.keep_every > 0 && !options.select.empty())
+  if (options.keep_every && !options.select.empty())
     throw Error(ErrorCode::usage, "--keep-every and --select both say which nodes leave: give one");
-  job.selection = parse_component(options.keep_every > 0
-                                      ? fmt::format("keep_every:every={}", options.keep_every)
-                                  : options.select.empty() ? SparsifyJob::kDefaultSelection
-                                                           : options.select);
+  job.selection =
+      parse_component(options.keep_every ? fmt::format("keep_every:every={}", *options.keep_every)
+                      : options.select.empty() ? SparsifyJob::kDefaultSelection
+                                               : options.select);
   job.nodes = parse_enum<NodeKind>(options.nodes, "--nodes");
   job.optimizer = optimizer_spec(options.optimizer, "", session.registry());
   job.linear_solver = options.linear_solver;
   job.estimator = options.estimator;
-  job.online = options.online;
+  job.online = static_cast<int>(options.online.value_or(0));
   job.as_given = options.as_given;
   job.keep_minimum = !options.is_study;
   const bool beforehand = options.redirect == "beforehand";
   if (options.redirect != "late") {
-    if (options.keep_every == 0 || options.online == 0) {
+    if (!options.keep_every || !options.online) {
       throw Error(
           ErrorCode::usage,
           fmt::format("--redirect {} needs --online and --keep-every: only then it is known "
                       "of each node whether it stays",
                       options.redirect));
     }
-    job.redirect_early = options.keep_every;
+    job.redirect_early = static_cast<int>(*options.keep_every);
     job.redirection.to = RedirectionRule::To::order;
   }
-  if ((options.online == 0 || beforehand) && (!options.redirect_to.empty() || options.newer ||
-                                              options.inflation != RedirectionRule{}.inflation)) {
+  if ((!options.online || beforehand) && (!options.redirect_to.empty() || options.newer ||
+                                          options.inflation != RedirectionRule{}.inflation)) {
     throw Error(ErrorCode::usage,
                 "--redirect-to, --newer and --inflation are for factors that come late: they need "
                 "--online, and --redirect late or early");
@@ -280,7 +279,8 @@ int run_sparsify(SparsifyCommandOptions options, Session& session) {
   LoadedGraph loaded = load_graph(options.graph, options.input, session);
   RedirectedRecording redirected;
   const bool beforehand = options.redirect == "beforehand";
-  if (beforehand) redirected = redirect_recording(loaded.graph, options.keep_every);
+  if (beforehand)
+    redirected = redirect_recording(loaded.graph, static_cast<int>(*options.keep_every));
   Graph& graph = beforehand ? redirected.graph : loaded.graph;
   // Once it is redirected: a measurement keeps the information that it has in the file.
   if (options.information_frame == "first") information_of_first_frame(graph);
@@ -313,80 +313,65 @@ int run_sparsify(SparsifyCommandOptions options, Session& session) {
   return result.converged ? 0 : static_cast<int>(ErrorCode::numerical);
 }
 
-void add_sparsify_options(ArgumentParser cli, SparsifyCommandOptions& options) {
-  cli.add_option("graph", options.graph, kGraphHelp)
-      .type_name("GRAPH")
-      .file_or_generated({"generator"})
-      .required();
-  cli.add_option("-o,--output", options.output, "write the sparse graph").type_name("OUT");
-  cli.add_option("--to", options.output_format, "format of OUT")
-      .component({"format"})
-      .type_name("FORMAT");
-  cli.add_option("--keep-every", options.keep_every,
-                 "one of so many nodes stays; --select for others")
-      .type_name("N")
-      .within(1.0, 1e9);
-  cli.add_option("--select", options.select,
+OptionFields<SparsifyCommandOptions> SparsifyCommandOptions::fields() {
+  using O = SparsifyCommandOptions;
+  return OptionFields<O>()
+      .text("graph", &O::graph, kGraphHelp)
+      .positional()
+      .placeholder("GRAPH")
+      .or_generated_by({"generator"})
+      .required()
+      .text("output", &O::output, "write the sparse graph")
+      .letter('o')
+      .placeholder("OUT")
+      .component("to", &O::output_format, {"format"}, "format of OUT")
+      .placeholder("FORMAT")
+      .integer("keep_every", &O::keep_every, 1, 1e9,
+               "one of so many nodes stays; --select for others")
+      .component("select", &O::select, {"node_selection"},
                  "which leave: smallest_blanket, least_loss, nearest, oldest, coverage "
                  "[smallest_blanket:part=0.5]")
-      .component({"node_selection"});
-  cli.add_option("--nodes", options.nodes, "what may leave: poses, landmarks or all [poses]")
-      .type_name("KIND")
-      .one_of({"poses", "landmarks", "all"});
-  cli.add_option("--topology", options.topology,
+      .choice("nodes", &O::nodes, {"poses", "landmarks", "all"},
+              "what may leave: poses, landmarks or all")
+      .placeholder("KIND")
+      .component("topology", &O::topology, {"topology"},
                  "pairs that get a factor: clt, cliquey, mi, dmi, ekld, mixed, odd, l1, best (of "
                  "all: minutes to hours); or one factor on all neighbours: glc [ekld]")
-      .component({"topology"});
-  cli.add_option("--population", options.population,
-                 "number of new factors: tree:γ, fill:α or loss:KLD [tree:2]")
-      .type_name("HOW");
-  cli.add_option("--recovery", options.recovery,
+      .text("population", &O::population,
+            "number of new factors: tree:γ, fill:α or loss:KLD [tree:2]")
+      .placeholder("HOW")
+      .component("recovery", &O::recovery, {"factor_recovery"},
                  "factor recovery: ncfd, fd, ip, pqn; closed_form for trees [ncfd]")
-      .component({"factor_recovery"});
-  cli.add_option(
-         "--scheme", options.scheme,
-         "single: one by one; runs: those in a row together; multi: all connected ones [single]")
-      .type_name("HOW")
-      .one_of({"single", "runs", "multi"});
-  cli.add_option("--sparsifier", options.sparsifier,
+      .choice("scheme", &O::scheme, {"single", "runs", "multi"},
+              "single: one by one; runs: those in a row together; multi: all connected ones "
+              "[single]")
+      .placeholder("HOW")
+      .optional()
+      .component("sparsifier", &O::sparsifier, {"sparsifier"},
                  "the sparsifier, with more options: sparsify:fit=graph")
-      .component({"sparsifier"})
-      .show_default();
-  cli.add_option("--edges", options.edges,
+      .component("edges", &O::edges, {"edge_selection"},
                  "remove loop closures instead, all poses stay: mac, greedy_tree, greedy_gain, l1, "
                  "random; :part=P of them stays")
-      .component({"edge_selection"});
-  cli.add_option("--online", options.online,
-                 "feed the graph pose by pose, and take nodes out every N poses")
-      .type_name("N")
-      .within(1.0, 1e9);
-  cli.add_option("--estimator", options.estimator, "online: the estimator")
-      .component({"estimator"})
-      .show_default();
-  cli.add_option("--optimizer", options.optimizer, "the optimizer, before and after")
-      .component({"optimizer"})
-      .show_default();
-  cli.add_option("--linear-solver", options.linear_solver,
+      .integer("online", &O::online, 1, 1e9,
+               "feed the graph pose by pose, and take nodes out every N poses")
+      .component("estimator", &O::estimator, {"estimator"}, "online: the estimator")
+      .component("optimizer", &O::optimizer, {"optimizer"}, "the optimizer, before and after")
+      .component("linear_solver", &O::linear_solver, {"linear_solver"},
                  "the linear solver that gives determinants")
-      .component({"linear_solver"})
-      .show_default();
-  cli.add_flag("--as-given", options.as_given, "the graph is at its minimum: do not optimise it");
-  cli.add_flag("--no-kld", options.no_kld, "do not compute the divergence (KLD)");
-  add_problem_options(cli, options.problem);
-  add_input_options(cli, options.input);
+      .boolean("as_given", &O::as_given, "the graph is at its minimum: do not optimise it")
+      .boolean("no_kld", &O::no_kld, "do not compute the divergence (KLD)")
+      .part(&O::problem)
+      .part(&O::input);
 }
 
-Command add_sparsify(ArgumentParser program) {
-  auto options = std::make_shared<SparsifyCommandOptions>();
-  ArgumentParser cli = program.add_command(
-      "sparsify", "take nodes out of a graph and keep their information in a few factors");
-  add_sparsify_options(cli, *options);
-  cli.footer(
+Command sparsify_command() {
+  return make_command<SparsifyCommandOptions>(
+      "sparsify", "take nodes out of a graph and keep their information in a few factors",
       "Example:\n"
       "  cairn sparsify my.g2o -o sparse.g2o\n"
       "  cairn sparsify my.g2o --keep-every 5 --scheme runs --population tree:1.5 -o sparse.g2o\n"
-      "  cairn sparsify my.g2o --edges greedy_gain:part=0.25 -o sparse.g2o");
-  return {cli, [options](Session& session) { return run_sparsify(*options, session); }};
+      "  cairn sparsify my.g2o --edges greedy_gain:part=0.25 -o sparse.g2o",
+      run_sparsify);
 }
 
 }  // namespace cairn::app

@@ -3,7 +3,6 @@
 
 #include <string>
 
-#include "arguments.hpp"
 #include "cairn/sparsification/redirection.hpp"
 #include "graph_files.hpp"
 #include "problem_setup.hpp"
@@ -16,13 +15,13 @@ struct SparsifyCommandOptions {
   std::string output, output_format;
   std::string sparsifier = "sparsify";
   std::string select;
-  int keep_every = 0;
+  std::optional<std::int64_t> keep_every;
   std::string edges;
   std::string nodes = "poses";
   std::string topology, recovery, population, scheme;
   std::string optimizer = kDefaultOptimizer, linear_solver = kDefaultLinearSolver;
   std::string estimator = "incremental_cholesky";
-  int online = 0;
+  std::optional<std::int64_t> online;  ///< take nodes out every so many poses
   bool as_given = false, no_kld = false;
   InputOptions input;
   ProblemOptions problem;
@@ -34,10 +33,9 @@ struct SparsifyCommandOptions {
   std::string information_frame = "second";
   std::string compared_at = "common";
   std::string record;
-};
 
-/// The options of `cairn sparsify`.
-void add_sparsify_options(ArgumentParser cli, SparsifyCommandOptions& options);
+  static OptionFields<SparsifyCommandOptions> fields();
+};
 
 /// Returns the exit code.
 int run_sparsify(SparsifyCommandOptions options, Session& session);

@@ -8,7 +8,6 @@
 
 #include <fmt/core.h>
 
-#include "arguments.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/sparsification/sparsification.hpp"
@@ -32,90 +31,89 @@ namespace {
 
 namespace json = boost::json;
 
-Command add_study_compact(ArgumentParser study) {
-  auto options = std::make_shared<CompactOptions>();  // lives as long as the parser and the run
-  options->is_study = true;
-  ArgumentParser cli =
-      study.add_command("compact", "cairn compact with a control, and beside everything");
-  add_compact_options(cli, *options, {"apal", "apfl", "fpfl", "rfpfl"});
-  cli.option("--strategy")
-      .description(
-          "all or few poses and loops: apal, apfl, fpfl; rfpfl at random, as many as fpfl "
-          "[fpfl]");
-  cli.add_option("--seed", options->seed, "of rfpfl").type_name("N").show_default();
-  cli.add_option("--draw", options->draw,
-                 "of rfpfl: loop closures first, with the poses at their ends, or poses first, and "
-                 "then loop closures between those, as the authors do")
-      .type_name("WHAT")
-      .one_of({"loops", "poses"})
-      .show_default();
-  cli.add_option("--error-ratio", options->error_ratio,
-                 "errors over those with all loops, at most, in the sample; 0: do not try")
-      .type_name("X")
-      .within(0.0, 1e9)
-      .show_default();
-  cli.add_option("--compare", options->compare,
-                 "covariances beside those with everything, each step (slow), as CSV")
-      .type_name("FILE");
-  cli.footer(
+/// Of `cairn compact` with a control.
+struct CompactStudyOptions {
+  CompactOptions compact;
+  CompactStudyOptions() { compact.is_study = true; }
+
+  static auto fields() {
+    using O = CompactOptions;
+    return OptionFields<CompactStudyOptions>().part(
+        &CompactStudyOptions::compact,
+        O::fields({"apal", "apfl", "fpfl", "rfpfl"},
+                  "all or few poses and loops: apal, apfl, fpfl; rfpfl at random, as many as fpfl "
+                  "[fpfl]")
+            .integer("seed", &O::seed, 0, kMostSeed, "of rfpfl")
+            .choice("draw", &O::draw, {"loops", "poses"},
+                    "of rfpfl: loop closures first, with the poses at their ends, or poses first, "
+                    "and then loop closures between those, as the authors do")
+            .placeholder("WHAT")
+            .real("error_ratio", &O::error_ratio, 0.0, 1e9,
+                  "errors over those with all loops, at most, in the sample; 0: do not try")
+            .text("compare", &O::compare,
+                  "covariances beside those with everything, each step (slow), as CSV")
+            .placeholder("FILE"));
+  }
+};
+
+Command study_compact() {
+  return make_command<CompactStudyOptions>(
+      "study compact", "cairn compact with a control, and beside everything",
       "Example:\n"
-      "  cairn study compact city.g2o --thresholds city.json --strategy rfpfl --seed 3");
-  return {cli, [options](Session& session) { return run_compact(*options, session); }};
+      "  cairn study compact city.g2o --thresholds city.json --strategy rfpfl --seed 3",
+      [](const CompactStudyOptions& options, Session& session) {
+        return run_compact(options.compact, session);
+      });
 }
 
-Command add_study_sparsify(ArgumentParser study) {
-  auto options = std::make_shared<SparsifyCommandOptions>();
-  options->is_study = true;
-  ArgumentParser cli = study.add_command(
-      "sparsify", "cairn sparsify as in the thesis, and with its problems recorded");
-  add_sparsify_options(cli, *options);
-  cli.add_option(
-         "--redirect", options->redirect,
-         "online: factors to nodes that leave are redirected once these have left (late), as soon "
-         "as the nodes are measured again (early), or in the recording along its odometry, as in "
-         "the thesis (beforehand)")
-      .type_name("WHEN")
-      .one_of({"late", "early", "beforehand"})
-      .show_default();
-  cli.add_option(
-         "--redirect-to", options->redirect_to,
-         "online: to the node with the most certain path of measurements, whose covariances "
-         "are added (path), the nearest in space (place) or by id (order), or the next by id "
-         "(next) [late: "
-         "path, early: order]")
-      .type_name("WHICH")
-      .one_of({"path", "place", "order", "next"});
-  cli.add_flag("--newer", options->newer,
-               "online: of two that are equally near, the newer (place, order)");
-  cli.add_option("--inflation", options->inflation,
-                 "online: the covariance of the path is multiplied by this, since its error is "
-                 "common to all factors "
-                 "that are redirected along it")
-      .type_name("X")
-      .within(0.0, 1e6)
-      .show_default();
-  cli.add_option(
-         "--information-frame", options->information_frame,
-         "in the plane: the frame of whose translation a measurement's information is, that of its "
-         "second pose as measured, as in g2o (second), or that of its first (first), as it seems "
-         "to be in the thesis")
-      .type_name("WHICH")
-      .one_of({"first", "second"})
-      .show_default();
-  cli.add_option(
-         "--compared-at", options->compared_at,
-         "for the KLD both graphs are linearised at the states of the original (common), or "
-         "each at its own minimum in world coordinates (minima), as in the thesis")
-      .type_name("WHERE")
-      .one_of({"common", "minima"})
-      .show_default();
-  cli.add_option("--record", options->record, "write every problem that comes up, as JSON")
-      .type_name("FILE");
-  cli.footer(
+/// Of `cairn sparsify` as in the thesis.
+struct SparsifyStudyOptions {
+  SparsifyCommandOptions sparsify;
+  SparsifyStudyOptions() { sparsify.is_study = true; }
+
+  static auto fields() {
+    using O = SparsifyCommandOptions;
+    return OptionFields<SparsifyStudyOptions>().part(
+        &SparsifyStudyOptions::sparsify,
+        O::fields()
+            .choice("redirect", &O::redirect, {"late", "early", "beforehand"},
+                    "online: factors to nodes that leave are redirected once these have left "
+                    "(late), as soon as the nodes are measured again (early), or in the recording "
+                    "along its odometry, as in the thesis (beforehand)")
+            .placeholder("WHEN")
+            .choice("redirect_to", &O::redirect_to, {"path", "place", "order", "next"},
+                    "online: to the node with the most certain path of measurements, whose "
+                    "covariances are added (path), the nearest in space (place) or by id (order), "
+                    "or the next by id (next) [late: path, early: order]")
+            .optional()
+            .boolean("newer", &O::newer,
+                     "online: of two that are equally near, the newer (place, order)")
+            .real("inflation", &O::inflation, 0.0, 1e6,
+                  "online: the covariance of the path is multiplied by this, since its error is "
+                  "common to all factors that are redirected along it")
+            .choice("information_frame", &O::information_frame, {"first", "second"},
+                    "in the plane: the frame of whose translation a measurement's information is, "
+                    "that of its second pose as measured, as in g2o (second), or that of its first "
+                    "(first), as it seems to be in the thesis")
+            .choice("compared_at", &O::compared_at, {"common", "minima"},
+                    "for the KLD both graphs are linearised at the states of the original "
+                    "(common), or each at its own minimum in world coordinates (minima), as in the "
+                    "thesis")
+            .placeholder("WHERE")
+            .text("record", &O::record, "write every problem that comes up, as JSON")
+            .placeholder("FILE"));
+  }
+};
+
+Command study_sparsify() {
+  return make_command<SparsifyStudyOptions>(
+      "study sparsify", "cairn sparsify as in the thesis, and with its problems recorded",
       "Example:\n"
       "  cairn study sparsify city.g2o --keep-every 5 --online 100 --redirect early "
-      "--record problems.json");
-  return {cli, [options](Session& session) { return run_sparsify(*options, session); }};
+      "--record problems.json",
+      [](const SparsifyStudyOptions& options, Session& session) {
+        return run_sparsify(options.sparsify, session);
+      });
 }
 
 // Problems ----------------------------------------------------------------------------------------
@@ -125,6 +123,28 @@ struct ProblemsOptions {
   std::vector<std::string> topologies{"ekld"}, recoveries{"ncfd"};
   std::string population = "tree:2";
   std::string curves, against = "time", latex;
+
+  static auto fields() {
+    using O = ProblemsOptions;
+    return OptionFields<O>()
+        .text("problems", &O::problems, "what cairn study sparsify --record has written")
+        .positional()
+        .placeholder("FILE")
+        .required()
+        .component("topology", &O::topologies, {"topology"},
+                   "pairs that get a factor (repeatedly) [ekld]")
+        .text("population", &O::population, "number of new factors: tree:γ or fill:α")
+        .placeholder("HOW")
+        .component("recovery", &O::recoveries, {"factor_recovery"},
+                   "what finds their information (repeatedly) [ncfd]")
+        .text("curves", &O::curves,
+              "the mean KLD of each recovery and blanket size as it falls, as CSV")
+        .placeholder("FILE")
+        .text("latex", &O::latex, kLatexHelp)
+        .placeholder("FILE")
+        .choice("against", &O::against, {"time", "iterations"}, "of --curves: time or iterations")
+        .placeholder("AXIS");
+  }
 };
 
 json::array notes_json(const ReplayRow& row) {
@@ -221,58 +241,31 @@ int solve_problems(const ProblemsOptions& options, Session& session) {
   return guard.interrupted() ? kExitInterrupted : 0;
 }
 
-Command add_study_problems(ArgumentParser study) {
-  auto options = std::make_shared<ProblemsOptions>();
-  ArgumentParser cli = study.add_command(
-      "problems", "solve recorded sparsification problems by each topology and recovery");
-  cli.add_option("problems", options->problems, "what cairn study sparsify --record has written")
-      .type_name("FILE")
-      .required();
-  cli.add_option("--topology", options->topologies, "pairs that get a factor (repeatedly) [ekld]")
-      .component({"topology"})
-      .repeatable();
-  cli.add_option("--population", options->population, "number of new factors: tree:γ or fill:α")
-      .type_name("HOW")
-      .show_default();
-  cli.add_option("--recovery", options->recoveries,
-                 "what finds their information (repeatedly) [ncfd]")
-      .component({"factor_recovery"})
-      .repeatable();
-  cli.add_option("--curves", options->curves,
-                 "the mean KLD of each recovery and blanket size as it falls, as CSV")
-      .type_name("FILE");
-  add_latex_option(cli, options->latex);
-  cli.add_option("--against", options->against, "of --curves: time or iterations")
-      .type_name("AXIS")
-      .one_of({"time", "iterations"})
-      .show_default();
-  cli.footer(
+Command study_problems() {
+  return make_command<ProblemsOptions>(
+      "study problems", "solve recorded sparsification problems by each topology and recovery",
       "Example:\n"
       "  cairn study problems problems.json --topology mi --recovery fd --recovery ncfd\n"
       "  cairn study problems problems.json --topology mi --recovery ip --recovery ncfd --curves "
       "kld.csv\n"
-      "  cairn plot kld.csv --y '*@3' --y '*@8' --log xy -o kld.svg");
-  return {cli, [options](Session& session) { return solve_problems(*options, session); }};
+      "  cairn plot kld.csv --y '*@3' --y '*@8' --log xy -o kld.svg",
+      solve_problems);
 }
 
 }  // namespace
 
-Command add_study(ArgumentParser program) {
-  ArgumentParser cli = program.add_command("study", "what only the tables of papers need");
-  cli.require_command();
-  const std::vector<Command> studies = {add_study_compact(cli), add_study_sparsify(cli),
-                                        add_study_problems(cli), add_study_objective(cli),
-                                        add_study_optimality(cli)};
-  cli.footer(
-      "Example:\n"
-      "  cairn study sparsify @manhattan --keep-every 5 --record problems.json\n"
-      "  cairn study problems problems.json --recovery ncfd --recovery ip");
-  return {cli, [studies](Session& session) {
-            for (const Command& study : studies) {
-              if (study.parser.parsed()) return study.run(session);
-            }
-            return 0;
-          }};
+std::vector<Command> study_commands() {
+  return {{.name = "study",
+           .summary = "what only the tables of papers need",
+           .remarks = "Example:\n"
+                      "  cairn study sparsify @manhattan --keep-every 5 --record problems.json\n"
+                      "  cairn study problems problems.json --recovery ncfd --recovery ip",
+           .options = {}},
+          study_compact(),
+          study_sparsify(),
+          study_problems(),
+          study_objective_command(),
+          study_optimality_command()};
 }
 
 }  // namespace cairn::app

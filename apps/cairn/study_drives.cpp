@@ -1,30 +1,25 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "study_drives.hpp"
 
+#include "command.hpp"
 #include "floors.hpp"
 
 namespace cairn::app {
 
-void add_drive_options(ArgumentParser cli, DriveOptions& options) {
-  cli.add_option("floor", options.floor, "the floor: floor.yaml, or @KIND[:k=v] to generate")
-      .type_name("FLOOR")
-      .file_or_generated({"floor_plan"})
-      .required();
-  cli.add_option("--runs", options.runs, "explorations, with the seeds that follow --seed")
-      .type_name("N")
-      .within(1, 1000000)
-      .show_default();
-  cli.add_option("--seed", options.seed, "of the first run").type_name("N").show_default();
-  cli.add_option("--explorer", options.explorer, "decides where to drive")
-      .component({"explorer"})
-      .show_default();
-  cli.add_option("--planner", options.planner, "finds the paths that are compared")
-      .component({"path_planner"})
-      .show_default();
-  cli.add_option("--world", options.world, "the robot, as of cairn explore")
-      .component({"world"})
-      .show_default();
-  add_slam_options(cli, options.slam);
+OptionFields<DriveOptions> DriveOptions::fields() {
+  using O = DriveOptions;
+  return OptionFields<O>()
+      .text("floor", &O::floor, "the floor: floor.yaml, or @KIND[:k=v] to generate")
+      .positional()
+      .placeholder("FLOOR")
+      .or_generated_by({"floor_plan"})
+      .required()
+      .integer("runs", &O::runs, 1, 1e6, "explorations, with the seeds that follow --seed")
+      .integer("seed", &O::seed, 0, kMostSeed, "of the first run")
+      .component("explorer", &O::explorer, {"explorer"}, "decides where to drive")
+      .component("planner", &O::planner, {"path_planner"}, "finds the paths that are compared")
+      .component("world", &O::world, {"world"}, "the robot, as of cairn explore")
+      .part(&O::slam);
 }
 
 StudyDrives::StudyDrives(const DriveOptions& options, Session& session)

@@ -6,7 +6,6 @@
 #include <memory>
 #include <string>
 
-#include "arguments.hpp"
 #include "cairn/exploration/exploration.hpp"
 #include "cairn/plugin/options.hpp"
 #include "cairn/plugin/registry.hpp"
@@ -24,10 +23,9 @@ struct DriveOptions {
   SlamNames slam{};
   int runs = 1;
   std::uint64_t seed = 1;
-};
 
-/// FLOOR, --runs, --seed and the names of the parts.
-void add_drive_options(ArgumentParser cli, DriveOptions& options);
+  static OptionFields<DriveOptions> fields();
+};
 
 /// Explores a floor with one seed after the other. Interrupts end it while it exists.
 class StudyDrives {

@@ -47,6 +47,21 @@ struct ObjectiveStudyOptions {
   double distance = 60.0, range = 4.0;
   int decisions = 4, candidates = 12, samples = 200;
   std::string paths;
+
+  static auto fields() {
+    using O = ObjectiveStudyOptions;
+    return OptionFields<O>()
+        .part(&O::drives)
+        .real("distance", &O::distance, 1.0, 1e6, "that each drives [m]")
+        .placeholder("M")
+        .integer("decisions", &O::decisions, 1, 1e6, "per run at which paths are compared, at most")
+        .integer("candidates", &O::candidates, 2, 1e6, "paths to random places at each of these")
+        .integer("samples", &O::samples, 2, 1e6, "of the trajectory, for each path")
+        .real("range", &O::range, 0.1, 1000.0, "of the scans that are expected on a path [m]")
+        .placeholder("M")
+        .text("paths", &O::paths, "a row for each path that was sampled, as CSV")
+        .placeholder("FILE");
+  }
 };
 
 /// A form of the objective, as options of `JointObjective`.
@@ -269,37 +284,12 @@ int run_study(const ObjectiveStudyOptions& options, Session& session) {
 
 }  // namespace
 
-Command add_study_objective(ArgumentParser study) {
-  auto options = std::make_shared<ObjectiveStudyOptions>();
-  ArgumentParser cli = study.add_command(
-      "objective", "which weight of the map's entropy orders paths as its expectation does");
-  add_drive_options(cli, options->drives);
-  cli.add_option("--distance", options->distance, "that each drives [m]")
-      .type_name("M")
-      .within(1.0, 1e6)
-      .show_default();
-  cli.add_option("--decisions", options->decisions, "per run at which paths are compared, at most")
-      .type_name("N")
-      .within(1, 1000000)
-      .show_default();
-  cli.add_option("--candidates", options->candidates, "paths to random places at each of these")
-      .type_name("N")
-      .within(2, 1000000)
-      .show_default();
-  cli.add_option("--samples", options->samples, "of the trajectory, for each path")
-      .type_name("N")
-      .within(2, 1000000)
-      .show_default();
-  cli.add_option("--range", options->range, "of the scans that are expected on a path [m]")
-      .type_name("M")
-      .within(0.1, 1000.0)
-      .show_default();
-  cli.add_option("--paths", options->paths, "a row for each path that was sampled, as CSV")
-      .type_name("FILE");
-  cli.footer(
+Command study_objective_command() {
+  return make_command<ObjectiveStudyOptions>(
+      "study objective", "which weight of the map's entropy orders paths as its expectation does",
       "Example:\n"
-      "  cairn study objective @rooms --runs 2 --samples 50 --paths paths.csv");
-  return {cli, [options](Session& session) { return run_study(*options, session); }};
+      "  cairn study objective @rooms --runs 2 --samples 50 --paths paths.csv",
+      run_study);
 }
 
 }  // namespace cairn::app

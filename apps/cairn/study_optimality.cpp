@@ -37,6 +37,19 @@ struct OptimalityStudyOptions {
   std::string solver = "block_cholesky";
   int poses = 1000, paths = 1000;
   double loop_gain = PathOptimalityOptions{}.loop_gain;
+
+  static auto fields() {
+    using O = OptimalityStudyOptions;
+    return OptionFields<O>()
+        .part(&O::drives)
+        .integer("poses", &O::poses, 2, 1e6, "of the graph at which paths are compared")
+        .integer("paths", &O::paths, 2, 1e6, "to random places on the known floor")
+        .real("loop_gain", &O::loop_gain, -1.0, 1e9,
+              "information that a loop closure on a path must exceed [nats]; negative: that of the "
+              "policy")
+        .component("linear_solver", &O::solver, {"linear_solver"},
+                   "factorises the matrix of the graph");
+  }
 };
 
 /// Adds the processor time from here to the end of the scope, which other work on the machine does
@@ -205,33 +218,12 @@ int run_study(const OptimalityStudyOptions& options, Session& session) {
 
 }  // namespace
 
-Command add_study_optimality(ArgumentParser study) {
-  auto options = std::make_shared<OptimalityStudyOptions>();
-  ArgumentParser cli = study.add_command(
-      "optimality", "D-optimality of many paths, exactly and by the Laplacian of the graph");
-  add_drive_options(cli, options->drives);
-  cli.add_option("--poses", options->poses, "of the graph at which paths are compared")
-      .type_name("N")
-      .within(2, 1000000)
-      .show_default();
-  cli.add_option("--paths", options->paths, "to random places on the known floor")
-      .type_name("N")
-      .within(2, 1000000)
-      .show_default();
-  cli.add_option(
-         "--loop-gain", options->loop_gain,
-         "information that a loop closure on a path must exceed [nats]; negative: that of the "
-         "policy")
-      .type_name("X")
-      .within(-1.0, 1e9)
-      .show_default();
-  cli.add_option("--linear-solver", options->solver, "factorises the matrix of the graph")
-      .component({"linear_solver"})
-      .show_default();
-  cli.footer(
+Command study_optimality_command() {
+  return make_command<OptimalityStudyOptions>(
+      "study optimality", "D-optimality of many paths, exactly and by the Laplacian of the graph",
       "Example:\n"
-      "  cairn study optimality @rooms --poses 200 --paths 100");
-  return {cli, [options](Session& session) { return run_study(*options, session); }};
+      "  cairn study optimality @rooms --poses 200 --paths 100",
+      run_study);
 }
 
 }  // namespace cairn::app

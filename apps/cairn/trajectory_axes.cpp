@@ -8,10 +8,6 @@
 
 namespace cairn::app {
 
-void add_axes_option(ArgumentParser cli, std::string& axes, const char* help) {
-  cli.add_option("--axes", axes, help).type_name("AXES").one_of({"robot", "camera"});
-}
-
 void show_in_robot_axes(LoadedGraph& loaded, const std::string& axes, const Session& session) {
   if (loaded.graph.factor_count() > 0 || axes == "robot") return;
   if (axes.empty() && loaded.report.format != "kitti") return;

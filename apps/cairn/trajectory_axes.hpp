@@ -3,14 +3,10 @@
 
 #include <string>
 
-#include "arguments.hpp"
 #include "graph_files.hpp"
 #include "session.hpp"
 
 namespace cairn::app {
-
-/// `--axes robot` or `--axes camera`, those of trajectories that are read; empty: not given.
-void add_axes_option(ArgumentParser cli, std::string& axes, const char* help);
 
 /// Turns a trajectory in the axes of a camera (x right, y down, z ahead) to those of a robot (x
 /// ahead, y left, z up): one that was read as KITTI, with a note, unless `axes` says robot, and

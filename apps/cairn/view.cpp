@@ -6,7 +6,6 @@
 #include <fmt/core.h>
 
 #include "album.hpp"
-#include "arguments.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
@@ -22,6 +21,17 @@ namespace {
 struct ViewOptions {
   AlbumOptions album;
   std::string output;
+
+  static auto fields() {
+    using O = ViewOptions;
+    return OptionFields<O>()
+        .part(&O::album,
+              AlbumOptions::fields("graphs (.gz too, @KIND to generate), trajectories, recordings "
+                                   "(--record), JSON of optimize, bench or replay"))
+        .text("output", &O::output, "the page [name of the first FILE, .html]")
+        .letter('o')
+        .placeholder("PAGE");
+  }
 };
 
 /// Only pages of cairn are overwritten without having been named.
@@ -86,15 +96,9 @@ int run(const ViewOptions& options, Session& session) {
 
 }  // namespace
 
-Command add_view(ArgumentParser program) {
-  auto options = std::make_shared<ViewOptions>();  // lives as long as the parser and the run
-  ArgumentParser cli = program.add_command("view", "an HTML report with interactive graphs");
-  add_album_options(cli, options->album,
-                    "graphs (.gz too, @KIND to generate), trajectories, recordings (--record), "
-                    "JSON of optimize, bench or replay");
-  cli.add_option("-o,--output", options->output, "the page [name of the first FILE, .html]")
-      .type_name("PAGE");
-  cli.footer(
+Command view_command() {
+  return make_command<ViewOptions>(
+      "view", "an HTML report with interactive graphs",
       "Graphs with the same ids are laid over each other: the lowest chi2 is the estimate, of two "
       "the\n"
       "first FILE else the initial estimate. Files without factors: ground truth, by id. The page "
@@ -103,8 +107,8 @@ Command add_view(ArgumentParser program) {
       "Example:\n"
       "  cairn optimize city.g2o -o best.g2o --json run.json --record run.jsonl\n"
       "  cairn view city.g2o best.g2o run.json run.jsonl -o city.html\n"
-      "  cairn explore floor.yaml --record robot.jsonl && cairn view robot.jsonl");
-  return {cli, [options](Session& session) { return run(*options, session); }};
+      "  cairn explore floor.yaml --record robot.jsonl && cairn view robot.jsonl",
+      run);
 }
 
 }  // namespace cairn::app

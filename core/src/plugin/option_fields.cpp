@@ -114,9 +114,53 @@ void OptionFieldList::choice(std::string_view name, std::ptrdiff_t place,
   add_text(name, OptionType::choice, help, place).spec.choices = std::move(choices);
 }
 
-void OptionFieldList::component(std::string_view name, std::ptrdiff_t place, std::string_view kind,
+void OptionFieldList::component(std::string_view name, std::ptrdiff_t place,
+                                std::vector<std::string> kinds, bool several,
                                 std::string_view help) {
-  add_text(name, OptionType::component, help, place).spec.choices = {std::string(kind)};
+  Field& field = add_text(name, OptionType::component, help, place);
+  field.spec.choices = std::move(kinds);
+  field.spec.components = several;
+}
+
+void OptionFieldList::optional_real(std::string_view name, std::ptrdiff_t place, double minimum,
+                                    double maximum, std::string_view help) {
+  using Member = std::optional<double>;
+  real(name, place, minimum, maximum, help);
+  Field& field = fields_.back();
+  field.spec.optional = true;
+  field.format = [](const void* member) {
+    return as<Member>(member) ? option_text(*as<Member>(member)) : std::string();
+  };
+  field.read = [](const Options& from, const std::string& of, void* member) {
+    as<Member>(member) = from.absent(of) ? Member() : Member(from.real(of));
+  };
+}
+
+void OptionFieldList::optional_integer(std::string_view name, std::ptrdiff_t place, double minimum,
+                                       double maximum, std::string_view help) {
+  using Member = std::optional<std::int64_t>;
+  Field& field = add(name, OptionType::integer, help, place);
+  field.spec.minimum = minimum;
+  field.spec.maximum = maximum;
+  field.spec.optional = true;
+  field.format = [](const void* member) {
+    return as<Member>(member) ? option_text(*as<Member>(member)) : std::string();
+  };
+  field.read = [](const Options& from, const std::string& of, void* member) {
+    as<Member>(member) = from.absent(of) ? Member() : Member(from.integer(of));
+  };
+}
+
+void OptionFieldList::list(std::string_view name, std::ptrdiff_t place, OptionType type,
+                           std::vector<std::string> kinds, std::string_view help) {
+  using Member = std::vector<std::string>;
+  Field& field = add(name, type, help, place);
+  field.spec.choices = std::move(kinds);
+  field.spec.list = true;
+  field.format = [](const void* member) { return list_text(as<Member>(member)); };
+  field.read = [](const Options& from, const std::string& of, void* member) {
+    as<Member>(member) = split_list(from.text(of));
+  };
 }
 
 void OptionFieldList::part(const OptionFieldList& fields, std::ptrdiff_t place) {
@@ -125,6 +169,8 @@ void OptionFieldList::part(const OptionFieldList& fields, std::ptrdiff_t place) 
     fields_.push_back(std::move(field));
   }
 }
+
+OptionSpec& OptionFieldList::last() { return fields_.back().spec; }
 
 OptionTable OptionFieldList::table(const void* defaults) const {
   OptionTable result;

@@ -16,9 +16,10 @@ namespace {
 
 std::string range_text(const OptionSpec& spec) {
   const bool low = std::isfinite(spec.minimum), high = std::isfinite(spec.maximum);
-  if (low && high) return fmt::format("{} to {}", spec.minimum, spec.maximum);
-  if (low) return fmt::format("at least {}", spec.minimum);
-  if (high) return fmt::format("at most {}", spec.maximum);
+  const char* const or_zero = spec.or_zero ? ", or 0" : "";
+  if (low && high) return fmt::format("{} to {}{}", spec.minimum, spec.maximum, or_zero);
+  if (low) return fmt::format("at least {}{}", spec.minimum, or_zero);
+  if (high) return fmt::format("at most {}{}", spec.maximum, or_zero);
   return "any";
 }
 
@@ -33,7 +34,8 @@ std::string expectation(const OptionSpec& spec) {
     case OptionType::choice:
       return fmt::format("one of {}", fmt::join(spec.choices, ", "));
     case OptionType::component:
-      return fmt::format("a name of kind {}", spec.choices.front());
+      return spec.choices.empty() ? "the name of a component"
+                                  : fmt::format("a name of kind {}", fmt::join(spec.choices, ", "));
     case OptionType::text:
       break;
   }
@@ -64,6 +66,25 @@ std::string option_text(bool value) { return value ? "true" : "false"; }
 std::string option_text(std::int64_t value) { return fmt::format("{}", value); }
 std::string option_text(double value) { return fmt::format("{}", value); }
 
+std::string list_text(const std::vector<std::string>& items) {
+  std::string text;
+  for (const std::string& item : items) {
+    if (!text.empty()) text += '\0';
+    text += item;
+  }
+  return text;
+}
+
+std::vector<std::string> split_list(std::string_view text) {
+  std::vector<std::string> items;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find('\0'), text.size());
+    items.emplace_back(text.substr(0, end));
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+  return items;
+}
+
 OptionTable& OptionTable::add(OptionSpec spec) {
   if (find(spec.name))
     throw std::logic_error(fmt::format("option '{}' is declared twice", spec.name));
@@ -75,8 +96,7 @@ OptionTable& OptionTable::boolean(std::string name, bool default_value, std::str
   return add({.name = std::move(name),
               .type = OptionType::boolean,
               .default_value = option_text(default_value),
-              .help = std::move(help),
-              .choices = {}});
+              .help = std::move(help)});
 }
 
 OptionTable& OptionTable::integer(std::string name, std::int64_t default_value, double minimum,
@@ -86,8 +106,7 @@ OptionTable& OptionTable::integer(std::string name, std::int64_t default_value, 
               .default_value = option_text(default_value),
               .help = std::move(help),
               .minimum = minimum,
-              .maximum = maximum,
-              .choices = {}});
+              .maximum = maximum});
 }
 
 OptionTable& OptionTable::real(std::string name, double default_value, double minimum,
@@ -97,16 +116,14 @@ OptionTable& OptionTable::real(std::string name, double default_value, double mi
               .default_value = option_text(default_value),
               .help = std::move(help),
               .minimum = minimum,
-              .maximum = maximum,
-              .choices = {}});
+              .maximum = maximum});
 }
 
 OptionTable& OptionTable::text(std::string name, std::string default_value, std::string help) {
   return add({.name = std::move(name),
               .type = OptionType::text,
               .default_value = std::move(default_value),
-              .help = std::move(help),
-              .choices = {}});
+              .help = std::move(help)});
 }
 
 OptionTable& OptionTable::choice(std::string name, std::string default_value,
@@ -157,6 +174,11 @@ Options::Options(const OptionTable& table, const OptionValues& values, std::stri
       value.given = true;
     }
     const std::string& text = value.text;
+    value.absent = spec.optional && text.empty();
+    if (value.absent) {
+      values_.emplace(spec.name, std::move(value));
+      continue;
+    }
     switch (spec.type) {
       case OptionType::boolean:
         if (text != "true" && text != "false" && text != "1" && text != "0" && text != "yes" &&
@@ -184,7 +206,8 @@ Options::Options(const OptionTable& table, const OptionValues& values, std::stri
         break;
     }
     if ((spec.type == OptionType::integer || spec.type == OptionType::real) &&
-        (value.number < spec.minimum || value.number > spec.maximum)) {
+        (value.number < spec.minimum || value.number > spec.maximum) &&
+        !(spec.or_zero && value.number == 0.0)) {
       refuse(owner, spec, text);
     }
     values_.emplace(spec.name, std::move(value));
@@ -211,6 +234,11 @@ std::int64_t Options::integer(std::string_view name) const {
 double Options::real(std::string_view name) const { return value(name, OptionType::real).number; }
 const std::string& Options::text(std::string_view name) const {
   return value(name, OptionType::text).text;
+}
+
+bool Options::absent(std::string_view name) const {
+  const auto it = values_.find(name);
+  return it != values_.end() && it->second.absent;
 }
 
 bool Options::given(std::string_view name) const {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -82,9 +83,19 @@ class CAIRN_API OptionFieldList {
               std::string_view help);
   void choice(std::string_view name, std::ptrdiff_t place, std::vector<std::string> choices,
               std::string_view help);
-  void component(std::string_view name, std::ptrdiff_t place, std::string_view kind,
-                 std::string_view help);
+  void component(std::string_view name, std::ptrdiff_t place, std::vector<std::string> kinds,
+                 bool several, std::string_view help);
+  void optional_real(std::string_view name, std::ptrdiff_t place, double minimum, double maximum,
+                     std::string_view help);
+  void optional_integer(std::string_view name, std::ptrdiff_t place, double minimum, double maximum,
+                        std::string_view help);
+  /// A member of type std::vector<std::string>.
+  void list(std::string_view name, std::ptrdiff_t place, OptionType type,
+            std::vector<std::string> kinds, std::string_view help);
   void part(const OptionFieldList& fields, std::ptrdiff_t place);
+
+  /// The option that was added last, without its default. Precondition: there is one.
+  OptionSpec& last();
 
   OptionTable table(const void* defaults) const;
   void read(const Options& options, void* result) const;
@@ -186,7 +197,100 @@ class OptionFields {
   template <class Interface>
   OptionFields& component(std::string_view name, std::string Struct::*member,
                           std::string_view help) {
-    fields_.component(name, place_of(member), Interface::kKind, help);
+    return component(name, member, {std::string(Interface::kKind)}, help);
+  }
+  /// Of one of several kinds; of any without one.
+  OptionFields& component(std::string_view name, std::string Struct::*member,
+                          std::vector<std::string> kinds, std::string_view help) {
+    fields_.component(name, place_of(member), std::move(kinds), false, help);
+    return *this;
+  }
+  /// Several of them in one text, `A,B` (`split_components`).
+  OptionFields& components(std::string_view name, std::string Struct::*member,
+                           std::vector<std::string> kinds, std::string_view help) {
+    fields_.component(name, place_of(member), std::move(kinds), true, help);
+    return *this;
+  }
+
+  /// The same fields of the same struct, declared elsewhere.
+  OptionFields& all_of(const OptionFields& fields) {
+    fields_.part(fields.fields_, 0);
+    return *this;
+  }
+
+  // Of commands, whose options are many: numbers that may be absent, and lists.
+  OptionFields& real(std::string_view name, std::optional<double> Struct::*member, double minimum,
+                     double maximum, std::string_view help) {
+    fields_.optional_real(name, place_of(member), minimum, maximum, help);
+    return *this;
+  }
+  OptionFields& integer(std::string_view name, std::optional<std::int64_t> Struct::*member,
+                        double minimum, double maximum, std::string_view help) {
+    fields_.optional_integer(name, place_of(member), minimum, maximum, help);
+    return *this;
+  }
+  OptionFields& text(std::string_view name, std::vector<std::string> Struct::*member,
+                     std::string_view help) {
+    fields_.list(name, place_of(member), OptionType::text, {}, help);
+    return *this;
+  }
+  OptionFields& component(std::string_view name, std::vector<std::string> Struct::*member,
+                          std::vector<std::string> kinds, std::string_view help) {
+    fields_.list(name, place_of(member), OptionType::component, std::move(kinds), help);
+    return *this;
+  }
+  /// A list, each item of which may hold several.
+  OptionFields& components(std::string_view name, std::vector<std::string> Struct::*member,
+                           std::vector<std::string> kinds, std::string_view help) {
+    component(name, member, std::move(kinds), help);
+    fields_.last().components = true;
+    return *this;
+  }
+
+  // What follows is of the option before it -------------------------------------------------------
+  /// A number may be zero besides, which stands for no limit.
+  OptionFields& or_zero() {
+    fields_.last().or_zero = true;
+    return *this;
+  }
+  /// A choice may be left out: the empty text.
+  OptionFields& optional() {
+    fields_.last().optional = true;
+    return *this;
+  }
+  /// Of a text: values that completion offers.
+  OptionFields& suggest(std::vector<std::string> values) {
+    fields_.last().choices = std::move(values);
+    return *this;
+  }
+  // How it stands on a command line (`CommandLineForm`).
+  OptionFields& placeholder(std::string_view text) {
+    fields_.last().form.placeholder = text;
+    return *this;
+  }
+  OptionFields& letter(char letter) {
+    fields_.last().form.letter = letter;
+    return *this;
+  }
+  OptionFields& positional(bool named = false) {
+    fields_.last().form.positional = true;
+    fields_.last().form.named = named;
+    return *this;
+  }
+  OptionFields& required() {
+    fields_.last().form.required = true;
+    return *this;
+  }
+  OptionFields& takes_words() {
+    fields_.last().form.takes_words = true;
+    return *this;
+  }
+  OptionFields& separated_by(char separator) {
+    fields_.last().form.separator = separator;
+    return *this;
+  }
+  OptionFields& or_generated_by(std::vector<std::string> kinds) {
+    fields_.last().form.generators = std::move(kinds);
     return *this;
   }
 

@@ -18,7 +18,20 @@ enum class OptionType {
   real,
   text,
   choice,     ///< one of `choices`
-  component,  ///< the name (with options) of another component; `choices[0]` is its kind
+  component,  ///< the name (with options) of another component, whose kind is one of `choices`
+};
+
+/// How an option stands on a command line, where it is that of a command: `--name VALUE` unless
+/// this says otherwise. Options that are written as `component:key=value` do not need it.
+struct CommandLineForm {
+  std::string placeholder;  ///< of its value in the help, such as FILE; empty: by its type
+  char letter = '\0';       ///< `-o` beside `--output`
+  bool positional = false;  ///< known by where it stands
+  bool named = true;        ///< may be given as `--name`; false of most positional ones
+  bool required = false;
+  bool takes_words = false;  ///< of a list: takes all words that follow, not one each time
+  char separator = '\0';     ///< of a list: one word may hold several values, `A,B`
+  std::vector<std::string> generators = {};  ///< `@NAME` of one of these kinds stands for a file
 };
 
 /// One option of a component: what it is called, what it may be, and one line of help.
@@ -29,7 +42,12 @@ struct OptionSpec {
   std::string help;  ///< one line; states the unit if there is one
   double minimum = -std::numeric_limits<double>::infinity();
   double maximum = std::numeric_limits<double>::infinity();
-  std::vector<std::string> choices;
+  std::vector<std::string> choices = {};  ///< of a text: what may be suggested; any other will do
+  bool optional = false;                  ///< a number or choice that may be absent: the empty text
+  bool or_zero = false;                   ///< a number that may be zero as well, for no limit
+  bool list = false;                      ///< several texts, one after the other (`split_list`)
+  bool components = false;                ///< of a component: several, `A,B` (`split_components`)
+  CommandLineForm form = {};
 };
 
 /// The options of one component. The same table checks the command line, fills in defaults and
@@ -69,6 +87,10 @@ CAIRN_API std::string option_text(bool value);
 CAIRN_API std::string option_text(std::int64_t value);
 CAIRN_API std::string option_text(double value);
 
+/// The text of a list, whose items have no zero byte; and its items.
+CAIRN_API std::string list_text(const std::vector<std::string>& items);
+CAIRN_API std::vector<std::string> split_list(std::string_view text);
+
 /// Option values as they were written: name to text.
 using OptionValues = std::map<std::string, std::string, std::less<>>;
 
@@ -86,6 +108,8 @@ class CAIRN_API Options {
   double real(std::string_view name) const;
   /// For text, choice and component options.
   const std::string& text(std::string_view name) const;
+  /// Whether an option that may be absent is.
+  bool absent(std::string_view name) const;
   /// Whether the value was given, not defaulted.
   bool given(std::string_view name) const;
 
@@ -96,6 +120,7 @@ class CAIRN_API Options {
     double number = 0.0;
     std::int64_t whole = 0;
     bool given = false;
+    bool absent = false;
   };
   const Value& value(std::string_view name, OptionType type) const;
   std::map<std::string, Value, std::less<>> values_;

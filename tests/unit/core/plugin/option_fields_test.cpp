@@ -10,6 +10,7 @@
 #include <functional>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -222,6 +223,103 @@ TEST(OptionFields, DeclarationsThatCannotBeRightAreProgrammingErrors) {
                    .integer("number", &Small::seed, 0, 1, "")
                    .table(),
                std::logic_error);
+}
+
+/// What commands declare besides: lists, what may be left out, and how it stands in a line of
+/// words.
+struct Delivery {
+  std::vector<std::string> baskets;
+  std::vector<std::string> carriers{"horse"};
+  std::string route;
+  std::string weather;
+  std::string stops = "inn";
+  std::optional<double> toll;
+  std::optional<std::int64_t> day;
+  int most = 0;
+
+  static auto fields() {
+    using D = Delivery;
+    return OptionFields<D>()
+        .text("baskets", &D::baskets, "what is sent")
+        .positional()
+        .required()
+        .components("carrier", &D::carriers, {"animal", "cart"}, "who brings it")
+        .separated_by(';')
+        .text("route", &D::route, "by which way")
+        .suggest({"hill", "ford"})
+        .choice("weather", &D::weather, {"fair", "foul"}, "if it must be so")
+        .optional()
+        .components("stops", &D::stops, {"house"}, "on the way")
+        .real("toll", &D::toll, 0.0, 10.0, "in silver")
+        .integer("day", &D::day, 1, 31, "of the month")
+        .letter('d')
+        .placeholder("DAY")
+        .integer("most", &D::most, 5, 9, "baskets a journey")
+        .or_zero();
+  }
+};
+
+TEST(OptionFields, WhatIsLeftOutIsAbsent) {
+  const Delivery none = from_values<Delivery>({}, "delivery");
+  EXPECT_THAT(none.baskets, ElementsAre());
+  EXPECT_THAT(none.carriers, ElementsAre("horse"));
+  EXPECT_EQ(none.toll, std::nullopt);
+  EXPECT_EQ(none.day, std::nullopt);
+  EXPECT_EQ(none.weather, "");
+  EXPECT_EQ(none.most, 0);
+
+  const Delivery given = from_values<Delivery>({{"baskets", list_text({"a b", "c,d"})},
+                                                {"carrier", ""},
+                                                {"route", "any"},
+                                                {"weather", "foul"},
+                                                {"toll", "2.5"},
+                                                {"day", "31"},
+                                                {"most", "9"}},
+                                               "delivery");
+  EXPECT_THAT(given.baskets, ElementsAre("a b", "c,d"));
+  EXPECT_THAT(given.carriers, ElementsAre());
+  EXPECT_EQ(given.route, "any");
+  EXPECT_EQ(given.weather, "foul");
+  EXPECT_EQ(given.toll, 2.5);
+  EXPECT_EQ(given.day, 31);
+  EXPECT_EQ(given.most, 9);
+  const OptionValues values = Delivery::fields().values(given);
+  const Delivery again = from_values<Delivery>(values, "delivery");
+  EXPECT_EQ(Delivery::fields().values(again), values);
+}
+
+TEST(OptionFields, WhatIsGivenIsChecked) {
+  const auto refused = [](const char* name, const char* value) {
+    return refusal([&] { from_values<Delivery>({{name, value}}, "delivery"); });
+  };
+  EXPECT_EQ(refused("toll", "11"), "delivery: option 'toll' is '11', expected a number, 0 to 10");
+  EXPECT_EQ(refused("day", "0"), "delivery: option 'day' is '0', expected an integer, 1 to 31");
+  EXPECT_EQ(refused("most", "4"),
+            "delivery: option 'most' is '4', expected an integer, 5 to 9, or 0");
+  EXPECT_THAT(refused("weather", "fould"), HasSubstr("did you mean 'foul'?"));
+}
+
+TEST(OptionFields, SayHowTheyStandOnACommandLine) {
+  const OptionTable table = Delivery::fields().table();
+  const OptionSpec& baskets = *table.find("baskets");
+  EXPECT_TRUE(baskets.list && baskets.form.positional && !baskets.form.named);
+  EXPECT_TRUE(baskets.form.required);
+  const OptionSpec& carrier = *table.find("carrier");
+  EXPECT_TRUE(carrier.list && carrier.components && carrier.form.named);
+  EXPECT_THAT(carrier.choices, ElementsAre("animal", "cart"));
+  EXPECT_EQ(carrier.form.separator, ';');
+  EXPECT_EQ(carrier.default_value, "horse");
+  EXPECT_THAT(table.find("route")->choices, ElementsAre("hill", "ford"));
+  EXPECT_TRUE(table.find("stops")->components && !table.find("stops")->list);
+  EXPECT_EQ(table.find("day")->form.letter, 'd');
+  EXPECT_EQ(table.find("day")->form.placeholder, "DAY");
+  EXPECT_EQ(table.find("day")->default_value, "");
+}
+
+TEST(OptionFields, AListIsOneText) {
+  for (const std::vector<std::string>& items :
+       {std::vector<std::string>{}, {"a"}, {"a", "b c"}, {"a,b", ":", "\n"}})
+    EXPECT_EQ(split_list(list_text(items)), items);
 }
 
 TEST(EnumNames, LeadBothWays) {
