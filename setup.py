@@ -54,9 +54,11 @@ class CMakeBuild(build_ext):
             if file.is_file():
                 shutil.copy(file, package)
         for library in (installed / "lib").glob("lib*.so.*"):  # a link, lib*.so.0.1, and the file that it names
-            if library.is_symlink():
+            if library.is_symlink() and not library.name.startswith("libcairn_program"):
                 shutil.copy(library, package / "lib")
-        shutil.copytree(installed / "lib" / "cairn", package / "lib" / "cairn", dirs_exist_ok=True)
+        # Commands are of the program, which is not in the wheel.
+        shutil.copytree(installed / "lib" / "cairn", package / "lib" / "cairn", dirs_exist_ok=True,
+                        ignore=shutil.ignore_patterns("commands.*", "*_commands.*", "generate_command.*"))
 
 
 if __name__ == "__main__":

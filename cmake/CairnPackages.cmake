@@ -98,6 +98,7 @@ set(libraries_control ${control_folder}/${libraries_package})
 file(WRITE ${libraries_control}/triggers "activate-noawait ldconfig\n")
 file(WRITE ${libraries_control}/shlibs "libcairn ${CAIRN_SOVERSION} ${libraries_package} ${this_version}
 libcairn_slam ${CAIRN_SOVERSION} ${libraries_package} ${this_version}
+libcairn_program ${CAIRN_SOVERSION} ${libraries_package} ${this_version}
 libcairn_c ${CAIRN_SOVERSION} ${libraries_package} ${this_version}\n")
 set(CPACK_DEBIAN_LIBRARIES_PACKAGE_CONTROL_EXTRA ${libraries_control}/triggers ${libraries_control}/shlibs)
 # CPack's scripts call ldconfig besides.

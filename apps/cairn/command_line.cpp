@@ -14,16 +14,17 @@
 #include <fmt/core.h>
 
 #include "cairn/io/output_file.hpp"
+#include "cairn/plugin/plugin_search.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "cairn/runtime/version.hpp"
 #include "cairn/text/spelling.hpp"
-#include "commands.hpp"
 #include "completion.hpp"
 #include "help.hpp"
 #include "manual_page.hpp"
-#include "option_words.hpp"
+#include "program/command.hpp"
+#include "program/option_words.hpp"
 
 namespace cairn::app {
 namespace {
@@ -33,11 +34,13 @@ struct HelpOptions {
   bool man = false;
   std::string man_pages;  ///< folder, or empty
 
-  static auto fields() {
+  /// `commands`: what there is to explain.
+  static auto fields(std::vector<std::string> commands = {}) {
     return OptionFields<HelpOptions>()
         .text("command", &HelpOptions::command, "the command that is to be explained")
         .positional()
         .placeholder("COMMAND")
+        .suggest(std::move(commands))
         .boolean("man", &HelpOptions::man, "as a manual page, in the language of man")
         .text("man_pages", &HelpOptions::man_pages,
               "write the manual pages of all commands to this folder")
@@ -57,45 +60,33 @@ struct CompleteOptions {
   }
 };
 
-/// A command, and what makes it.
-struct NamedCommand {
-  std::string_view name;
-  Command (*make)();
-};
-
-constexpr std::array kCommands{NamedCommand{"info", info_command},
-                               NamedCommand{"optimize", optimize_command},
-                               NamedCommand{"bench", bench_command},
-                               NamedCommand{"replay", replay_command},
-                               NamedCommand{"online", online_command},
-                               NamedCommand{"marginals", marginals_command},
-                               NamedCommand{"compact", compact_command},
-                               NamedCommand{"sparsify", sparsify_command},
-                               NamedCommand{"evaluate", evaluate_command},
-                               NamedCommand{"view", view_command},
-                               NamedCommand{"plot", plot_command},
-                               NamedCommand{"convert", convert_command},
-                               NamedCommand{"generate", generate_command},
-                               NamedCommand{"explore", explore_command},
-                               NamedCommand{"map", map_command},
-                               NamedCommand{"plugins", plugins_command},
-                               NamedCommand{"new-plugin", new_plugin_command}};
-
-/// The commands that are needed to understand a line: the one that it begins with, or all. To build
-/// the options of all takes longer than to read a small graph.
-std::vector<Command> needed_commands(std::span<const char* const> words) {
-  if (words.size() == 1 && words.front() == std::string_view("--version")) return {};
-  std::vector<Command> commands;
-  // A configuration file has sections for any.
-  const auto is_config = [](std::string_view word) { return word.starts_with("--config"); };
-  const bool all = words.empty() || std::ranges::any_of(words, is_config);
-  const std::string_view first = words.empty() ? "" : words.front();
-  for (const NamedCommand& each : kCommands) {
-    if (!all && each.name == first) return {each.make()};
-    commands.push_back(each.make());
+/// What `--plugin` names among the words: a plugin may bring a command, and so has to be there
+/// before they are understood.
+std::vector<std::string> named_plugins(std::span<const char* const> words) {
+  constexpr std::string_view kOption = "--plugin";
+  std::vector<std::string> files;
+  for (std::size_t k = 1; k < words.size(); ++k) {
+    const std::string_view word = words[k];
+    if (word == kOption && k + 1 < words.size()) files.emplace_back(words[++k]);
+    if (word.starts_with(kOption) && word.substr(kOption.size()).starts_with('='))
+      files.emplace_back(word.substr(kOption.size() + 1));
   }
-  for (Command& study : study_commands()) commands.push_back(std::move(study));
-  return commands;
+  return files;
+}
+
+/// The word that may name the command, if the words can mean no other: a configuration file may
+/// have a section for any.
+std::string_view first_command(std::span<const char* const> words) {
+  const auto is_config = [](std::string_view word) { return word.starts_with("--config"); };
+  return words.size() < 2 || std::ranges::any_of(words, is_config) ? "" : words[1];
+}
+
+Error nothing_found(const Registry& registry) {
+  std::string text =
+      "no plugins found; name their folder in CAIRN_PLUGIN_PATH, or a file with --plugin";
+  for (const PluginProblem& problem : registry.problems())
+    text += fmt::format("\n  note: {}", problem.message);
+  return {ErrorCode::plugin, text};
 }
 
 OptionTable common_options() {
@@ -133,28 +124,31 @@ std::string suggestion(const std::string& word, const std::vector<std::string>& 
   return nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest);
 }
 
-Error unknown_command(const std::string& word, const Program& program, const Command& above) {
+Error unknown_command(const std::string& word, const Program& program, const CommandEntry& above) {
   std::vector<std::string> names;
-  for (const Command* command : program.below(above)) names.push_back(own_name(*command));
+  for (const CommandEntry* command : program.below(above)) names.push_back(own_name(*command));
   return {ErrorCode::usage,
           fmt::format("there is no command '{}'{}", word, what_is_on_offer(word, names))};
 }
 
 /// Those of the command, and of all below it.
-void write_manual_pages(const Program& program, const Command& command, const std::string& folder) {
+void write_manual_pages(const Program& program, const CommandEntry& command,
+                        const std::string& folder) {
   OutputFile file(std::filesystem::path(folder) / (manual_page_name(command) + ".1"));
   file.write(manual_page(program, command));
   file.finish();
-  for (const Command* each : program.below(command)) write_manual_pages(program, *each, folder);
+  for (const CommandEntry* each : program.below(command))
+    write_manual_pages(program, *each, folder);
 }
 
 /// The command that `cairn help COMMAND…` names.
-const Command& explained_command(const Program& program, const std::vector<std::string>& words) {
-  const Command* command = &program.self;
+const CommandEntry& explained_command(const Program& program,
+                                      const std::vector<std::string>& words) {
+  const CommandEntry* command = &program.self;
   for (const std::string& word : words) {
-    const std::vector<const Command*> below = program.below(*command);
+    const std::vector<const CommandEntry*> below = program.below(*command);
     const auto next =
-        std::ranges::find(below, word, [](const Command* each) { return own_name(*each); });
+        std::ranges::find(below, word, [](const CommandEntry* each) { return own_name(*each); });
     if (next == below.end()) throw unknown_command(word, program, *command);
     command = *next;
   }
@@ -162,7 +156,7 @@ const Command& explained_command(const Program& program, const std::vector<std::
 }
 
 int explain(const Program& program, const HelpOptions& options) {
-  const Command& command = explained_command(program, options.command);
+  const CommandEntry& command = explained_command(program, options.command);
   if (!options.man_pages.empty()) {
     std::error_code error;
     std::filesystem::create_directories(options.man_pages, error);
@@ -174,7 +168,7 @@ int explain(const Program& program, const HelpOptions& options) {
 }
 
 Error unknown_word(const std::vector<std::string>& words, const Program& program,
-                   const Command& command) {
+                   const CommandEntry& command) {
   const std::string name = full_name(command);
   const bool is_program = program.is_self(command);
   const auto option = std::find_if(words.begin(), words.end(), looks_like_option);
@@ -197,8 +191,8 @@ std::string parser_name(const OptionSpec& option) {
 }
 
 /// An argument or option that is missing; `message` is the parser's.
-Error missing(const std::string& message, const Command& command) {
-  for (const OptionSpec& option : command.options.specs()) {
+Error missing(const std::string& message, const CommandEntry& command) {
+  for (const OptionSpec& option : command.options()) {
     if (message != parser_name(option) + " is required") continue;
     const std::string what =
         option.form.positional ? value_name(option) : long_name(option) + " " + value_name(option);
@@ -209,7 +203,7 @@ Error missing(const std::string& message, const Command& command) {
 
 /// A value that is missing, of the wrong type, or refused by the option's own check, whose words
 /// stand after the option's name.
-Error bad_value(const ParseOutcome& outcome, const Program& program, const Command& command) {
+Error bad_value(const ParseOutcome& outcome, const Program& program, const CommandEntry& command) {
   std::string what = outcome.message;
   for (const OptionSpec* option : all_options(program, command)) {
     const std::string name = parser_name(*option);
@@ -236,7 +230,7 @@ Error unknown_key(const std::string& what, const Program& program) {
   const std::size_t dot = path.rfind('.');
   const std::string key = path.substr(dot == std::string::npos ? 0 : dot + 1);
   const std::string section = dot == std::string::npos ? "" : path.substr(0, dot);
-  const Command* command = section.empty() ? &program.self : program.find(section);
+  const CommandEntry* command = section.empty() ? &program.self : program.find(section);
   if (!command) {
     return {ErrorCode::usage,
             fmt::format("--config: there is no command '{}' for a section", section)};
@@ -259,40 +253,32 @@ int print_usage_of_nothing(const Program& program) {
 CommandLine::CommandLine(Session& session, std::span<const char* const> words)
     : session_(session),
       words_(words),
-      program_{.self = {.name = {},
-                        .summary = "cairn: optimises factor graphs (graph SLAM); everything in it "
-                                   "is chosen by name",
-                        .remarks = "Example:\n"
-                                   "  cairn generate sphere -o sphere.g2o && cairn optimize "
-                                   "sphere.g2o -o best.g2o\n"
-                                   "  cairn bench sphere.g2o --linear-solver "
-                                   "block_cholesky,cholmod,eigen",
-                        .options = common_options()},
-               .commands = needed_commands(words.subspan(1))} {
-  add_own_commands();
-}
-
-void CommandLine::add_own_commands() {
-  program_.commands.push_back({.name = "help",
-                               .summary = "this text, or that of a command",
-                               .remarks = "Example:\n"
-                                          "  cairn help bench\n"
-                                          "  cairn help study problems --man | man -l -",
-                               .options = HelpOptions::fields().table(),
-                               .run = [this](const Options& options, Session&) {
-                                 return explain(program_, HelpOptions::fields().read(options));
-                               }});
-  program_.commands.push_back(
-      {.name = "complete",
-       .summary = "what may come next on a command line, for shells",
-       .remarks = "A line for each: word, tab, description; a line without a word: the name of a "
-                  "file.\n\n"
-                  "Example:\n"
-                  "  cairn complete -- optimize --linear-solver block",
-       .options = CompleteOptions::fields().table(),
-       .run = [this](const Options& options, Session&) {
-         return complete(CompleteOptions::fields().read(options).words);
-       }});
+      program_{
+          .self = CommandEntry(
+              "", "cairn: optimises factor graphs (graph SLAM); everything in it is chosen by name",
+              "Example:\n"
+              "  cairn generate sphere -o sphere.g2o && cairn optimize sphere.g2o -o best.g2o\n"
+              "  cairn bench sphere.g2o --linear-solver block_cholesky,cholmod,eigen",
+              common_options()),
+          .commands = {}} {
+  if (words.size() == 2 && words[1] == std::string_view("--version")) return;
+  session.common.plugins = named_plugins(words);
+  program_.commands = commands_on_offer(first_command(words), session);
+  if (program_.commands.empty()) throw nothing_found(session.registry());
+  std::vector<std::string> names;
+  for (const CommandEntry* command : program_.below(program_.self))
+    names.push_back(command->name());
+  program_.commands.emplace_back(kHelp, "this text, or that of a command",
+                                 "Example:\n"
+                                 "  cairn help bench\n"
+                                 "  cairn help study problems --man | man -l -",
+                                 HelpOptions::fields(std::move(names)).table());
+  program_.commands.emplace_back(
+      kComplete, "what may come next on a command line, for shells",
+      "A line for each: word, tab, description; a line without a word: the name of a file.\n\n"
+      "Example:\n"
+      "  cairn complete -- optimize --linear-solver block",
+      CompleteOptions::fields().table());
 }
 
 int CommandLine::complete(const std::vector<std::string>& words) {
@@ -310,8 +296,8 @@ std::function<int()> CommandLine::parse() {
       return complete(words);
     };
   }
-  const ParseOutcome outcome = OptionParser(program_.self.options, program_.commands).parse(words_);
-  const Command& command = outcome.command ? *outcome.command : program_.self;
+  const ParseOutcome outcome = parse_command_line(program_.self.table(), program_.commands, words_);
+  const CommandEntry& command = outcome.command ? *outcome.command : program_.self;
   switch (outcome.kind) {
     case ParseOutcome::Kind::help:
       return [text = help_text(program_, command)] { return write_stdout(text), 0; };
@@ -334,15 +320,26 @@ std::function<int()> CommandLine::parse() {
     case ParseOutcome::Kind::command:
       break;
   }
-  session_.common = CommonOptions::fields().read(
-      Options(CommonOptions::fields().table(), outcome.common, "cairn"));
+  session_.set_common(from_values<CommonOptions>(outcome.common, "cairn"));
   session_.files.add_input(outcome.config_file);
-  const std::string name = full_name(command);
-  return [this, &command, name, options = Options(command.options, outcome.values, name)] {
+  if (command.name() == kHelp) {
+    return [this, options = HelpOptions::fields().read(
+                      Options(command.table(), outcome.values, "cairn help"))] {
+      return explain(program_, options);
+    };
+  }
+  if (command.name() == kComplete) {
+    return [this, options = from_values<CompleteOptions>(outcome.values, "cairn complete")] {
+      return complete(options.words);
+    };
+  }
+  return [this, &command, values = outcome.values] {
     try {
-      return command.run(options, session_);
+      return session_.registry()
+          .make<Command>(ComponentSpec{command.name(), values})
+          ->run(session_);
     } catch (const Error& error) {
-      throw Error(error.code(), with_option_of_command(error.what(), name,
+      throw Error(error.code(), with_option_of_command(error.what(), full_name(command),
                                                        names_of(all_options(program_, command))));
     }
   };

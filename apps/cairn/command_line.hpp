@@ -24,8 +24,6 @@ class CommandLine {
  private:
   /// What `cairn complete -- WORD…` does.
   int complete(const std::vector<std::string>& words);
-  /// `help` and `complete`, which are about all commands.
-  void add_own_commands();
 
   Session& session_;
   std::span<const char* const> words_;

@@ -10,7 +10,7 @@
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "option_parser.hpp"
-#include "table.hpp"
+#include "program/table.hpp"
 
 namespace cairn::app {
 namespace {
@@ -137,7 +137,7 @@ class Place {
   /// The option whose value comes next, or null.
   const OptionSpec* pending() const { return pending_; }
   bool options_may_follow() const { return !only_positionals_; }
-  std::vector<const Command*> commands() const { return program_.below(*command_); }
+  std::vector<const CommandEntry*> commands() const { return program_.below(*command_); }
 
   /// All that may be given here by a name, with the options of every command.
   std::vector<const OptionSpec*> options() const {
@@ -159,7 +159,7 @@ class Place {
   /// The positional argument that comes next, or null.
   const OptionSpec* positional() const {
     int before = positionals_;
-    for (const OptionSpec& option : command_->options.specs()) {
+    for (const OptionSpec& option : command_->options()) {
       if (!option.form.positional) continue;
       if (before == 0 || option.list) return &option;
       --before;
@@ -169,7 +169,7 @@ class Place {
 
  private:
   bool descend(const std::string& word) {
-    for (const Command* command : commands()) {
+    for (const CommandEntry* command : commands()) {
       if (own_name(*command) != word) continue;
       command_ = command;
       positionals_ = 0;
@@ -179,7 +179,7 @@ class Place {
   }
 
   const Program& program_;
-  const Command* command_;
+  const CommandEntry* command_;
   const OptionSpec* pending_ = nullptr;
   int positionals_ = 0;
   bool only_positionals_ = false;
@@ -204,8 +204,8 @@ Completion complete(const Program& program, const std::vector<std::string>& word
       for (const std::string& name : option_names(*each)) collector.add(name, each->help);
     }
   } else {
-    for (const Command* command : place.commands())
-      collector.add(own_name(*command), command->summary);
+    for (const CommandEntry* command : place.commands())
+      collector.add(own_name(*command), command->summary());
     if (const OptionSpec* argument = place.positional())
       add_value(collector, 0, *argument, registry);
   }

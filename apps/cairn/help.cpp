@@ -6,7 +6,7 @@
 #include <fmt/core.h>
 
 #include "option_parser.hpp"
-#include "table.hpp"
+#include "program/table.hpp"
 
 namespace cairn::app {
 namespace {
@@ -26,49 +26,48 @@ std::string right_column(const OptionSpec& option) {
 
 Table two_columns() { return Table({{"", Table::Align::left}, {"", Table::Align::left}}, "  "); }
 
-std::string option_lines(const Program& program, const Command& command) {
+std::string option_lines(const Program& program, const CommandEntry& command) {
   Table lines = two_columns();
   const auto add = [&](const OptionSpec& option) {
     lines.add({left_column(option), right_column(option)});
   };
-  for (const OptionSpec& option : command.options.specs()) {
+  for (const OptionSpec& option : command.options()) {
     if (option.form.positional) add(option);
   }
   if (program.is_self(command)) {
     add(help_flag());
     add(version_flag());
   }
-  for (const OptionSpec& option : command.options.specs()) {
+  for (const OptionSpec& option : command.options()) {
     if (!option.form.positional) add(option);
   }
   return lines.text(false);
 }
 
-std::string command_lines(const std::vector<const Command*>& commands) {
+std::string command_lines(const std::vector<const CommandEntry*>& commands) {
   Table lines = two_columns();
-  for (const Command* command : commands) lines.add({own_name(*command), command->summary});
+  for (const CommandEntry* command : commands) lines.add({own_name(*command), command->summary()});
   return lines.text(false);
 }
 
 /// On one line or two: what every command takes.
 std::string common_options(const Program& program) {
   std::string line = "Also:";
-  for (const OptionSpec& option : program.self.options.specs())
-    line += " [" + left_column(option) + "]";
+  for (const OptionSpec& option : program.self.options()) line += " [" + left_column(option) + "]";
   return line + "\n      (what every command takes; see cairn --help)\n";
 }
 
 }  // namespace
 
-std::string usage_line(const Command& command) {
+std::string usage_line(const CommandEntry& command) {
   std::string text = full_name(command) + " [OPTIONS]";
-  for (const OptionSpec& option : command.options.specs()) {
+  for (const OptionSpec& option : command.options()) {
     if (!option.form.positional) continue;
     const std::string word = value_name(option);
     text += " " + (option.form.required ? word : "[" + word + "]");
     if (option.list) text += "...";
   }
-  for (const OptionSpec& option : command.options.specs()) {
+  for (const OptionSpec& option : command.options()) {
     if (option.form.positional || !option.form.required) continue;
     const std::string letter = short_name(option);
     text += fmt::format(" {} {}", letter.empty() ? long_name(option) : letter, value_name(option));
@@ -76,18 +75,18 @@ std::string usage_line(const Command& command) {
   return text;
 }
 
-std::string help_text(const Program& program, const Command& command) {
-  const std::vector<const Command*> commands = program.below(command);
+std::string help_text(const Program& program, const CommandEntry& command) {
+  const std::vector<const CommandEntry*> commands = program.below(command);
   const bool is_program = program.is_self(command);
   std::string text = is_program ? "" : full_name(command) + ": ";
-  text += command.summary + "\n\nUsage: " +
+  text += command.summary() + "\n\nUsage: " +
           (commands.empty() ? usage_line(command) : full_name(command) + " COMMAND [OPTIONS]") +
           "\n\n";
   if (!commands.empty()) text += "Commands:\n" + command_lines(commands);
   if (is_program) text += "\nOptions of every command:\n";
   text += option_lines(program, command);
   if (!is_program) text += "\n" + common_options(program);
-  return text + "\n" + command.remarks + "\n";
+  return text + "\n" + command.footer() + "\n";
 }
 
 }  // namespace cairn::app

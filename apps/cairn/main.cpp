@@ -20,11 +20,11 @@
 #include "cairn/io/output_file.hpp"
 #include "cairn/runtime/error.hpp"
 #include "command_line.hpp"
-#include "graph_files.hpp"
-#include "interrupt.hpp"
-#include "option_words.hpp"
-#include "session.hpp"
-#include "table.hpp"
+#include "program/graph_files.hpp"
+#include "program/interrupt.hpp"
+#include "program/option_words.hpp"
+#include "program/session.hpp"
+#include "program/table.hpp"
 
 namespace {
 

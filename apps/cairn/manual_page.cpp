@@ -15,7 +15,7 @@
 #include "cairn/runtime/version.hpp"
 #include "help.hpp"
 #include "option_parser.hpp"
-#include "table.hpp"
+#include "program/table.hpp"
 
 namespace cairn::app {
 namespace {
@@ -114,17 +114,17 @@ std::string item(const OptionSpec& option) {
   return ".TP\n" + head(option) + "\n" + roff(sentence(option.help)) + "\n" + about_value(option);
 }
 
-std::string arguments(const Command& command) {
+std::string arguments(const CommandEntry& command) {
   std::string text;
-  for (const OptionSpec& option : command.options.specs()) {
+  for (const OptionSpec& option : command.options()) {
     if (option.form.positional) text += item(option);
   }
   return text;
 }
 
-std::string options(const Command& command) {
+std::string options(const CommandEntry& command) {
   std::string text;
-  for (const OptionSpec& option : command.options.specs()) {
+  for (const OptionSpec& option : command.options()) {
     if (!option.form.positional) text += item(option);
   }
   return text;
@@ -134,9 +134,9 @@ std::string section(const std::string& title, const std::string& text) {
   return text.empty() ? "" : ".SH " + title + "\n" + text;
 }
 
-/// The footer of the help: paragraphs, and below "Example:" commands, indented, with remarks.
+/// The footer of the help: paragraphs, and below "Example:" commands, indented, with notes.
 struct Footer {
-  std::string remarks;
+  std::string notes;
   std::string examples;
 };
 
@@ -150,7 +150,7 @@ Footer parts_of(const std::string& footer) {
       in_example = true;
       continue;
     }
-    std::string& text = in_example ? parts.examples : parts.remarks;
+    std::string& text = in_example ? parts.examples : parts.notes;
     const bool is_code = line.starts_with("  ");
     if (is_code && !was_code) text += ".PP\n.nf\n.RS 4\n";
     if (!is_code && was_code) text += ".RE\n.fi\n.PP\n";
@@ -160,12 +160,12 @@ Footer parts_of(const std::string& footer) {
     else
       text += roff(line.substr(is_code ? 2 : 0)) + "\n";
   }
-  if (was_code) (in_example ? parts.examples : parts.remarks) += ".RE\n.fi\n";
-  while (parts.remarks.ends_with(".PP\n")) parts.remarks.resize(parts.remarks.size() - 4);
+  if (was_code) (in_example ? parts.examples : parts.notes) += ".RE\n.fi\n";
+  while (parts.notes.ends_with(".PP\n")) parts.notes.resize(parts.notes.size() - 4);
   return parts;
 }
 
-std::string synopsis(const Program& program, const Command& command) {
+std::string synopsis(const Program& program, const CommandEntry& command) {
   const std::string name = full_name(command);
   if (!program.below(command).empty())
     return strong(name) + " " + slanted("COMMAND") + " [" + slanted("OPTIONS") + "]\n";
@@ -173,16 +173,16 @@ std::string synopsis(const Program& program, const Command& command) {
 }
 
 /// The summary that `whatis` and `apropos` search.
-std::string summary(const Command& command) {
-  const std::string& text = command.summary;
+std::string summary(const CommandEntry& command) {
+  const std::string& text = command.summary();
   return text.starts_with("cairn: ") ? text.substr(7) : text;
 }
 
-std::string command_list(const Program& program, const Command& command) {
+std::string command_list(const Program& program, const CommandEntry& command) {
   std::string text;
-  for (const Command* each : program.below(command)) {
-    text += ".TP\n.BR " + roff(manual_page_name(*each)) + " (1)\n" + roff(sentence(each->summary)) +
-            "\n";
+  for (const CommandEntry* each : program.below(command)) {
+    text += ".TP\n.BR " + roff(manual_page_name(*each)) + " (1)\n" +
+            roff(sentence(each->summary())) + "\n";
   }
   return text;
 }
@@ -209,11 +209,11 @@ std::string environment() {
 }
 
 /// The page of the command that it belongs to, that of the program, and two that everybody needs.
-std::string see_also(const Program& program, const Command& command) {
+std::string see_also(const Program& program, const CommandEntry& command) {
   const std::string own = manual_page_name(command);
   std::vector<std::string> names;
-  const std::size_t blank = command.name.find(' ');
-  if (blank != std::string::npos) names.push_back("cairn-" + command.name.substr(0, blank));
+  const std::size_t blank = command.name().find(' ');
+  if (blank != std::string::npos) names.push_back("cairn-" + command.name().substr(0, blank));
   if (!program.is_self(command)) names.emplace_back("cairn");
   for (const char* name : {"cairn-plugins", "cairn-optimize"}) {
     if (own != name) names.emplace_back(name);
@@ -226,19 +226,19 @@ std::string see_also(const Program& program, const Command& command) {
 
 }  // namespace
 
-std::string manual_page_name(const Command& command) {
+std::string manual_page_name(const CommandEntry& command) {
   std::string name = full_name(command);
   std::ranges::replace(name, ' ', '-');
   return name;
 }
 
-std::string manual_page(const Program& program, const Command& command) {
+std::string manual_page(const Program& program, const CommandEntry& command) {
   const std::string name = manual_page_name(command);
   std::string title = name;
   std::ranges::transform(title, title.begin(),
                          [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
   const bool is_program = program.is_self(command);
-  const Footer footer = parts_of(command.remarks);
+  const Footer footer = parts_of(command.footer());
   const std::string own =
       item(help_flag()) + (is_program ? item(version_flag()) : "") + options(command);
   return ".\\\" Written by cairn help --man.\n.TH " + roff(title) +
@@ -246,7 +246,7 @@ std::string manual_page(const Program& program, const Command& command) {
          section("NAME", roff(name) + " \\- " + roff(summary(command)) + "\n") +
          section("SYNOPSIS", synopsis(program, command)) +
          section("DESCRIPTION", roff(sentence(summary(command))) + "\n" +
-                                    (footer.remarks.empty() ? "" : ".PP\n" + footer.remarks)) +
+                                    (footer.notes.empty() ? "" : ".PP\n" + footer.notes)) +
          section("COMMANDS", command_list(program, command)) +
          section("ARGUMENTS", arguments(command)) +
          section(is_program ? "OPTIONS OF EVERY COMMAND" : "OPTIONS", own) +

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "option_parser.hpp"
-#include "decimal_number.hpp"
-#include "table.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -21,6 +19,9 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>     // definitions that App.hpp only declares
 #include <CLI/Formatter.hpp>  // likewise
+
+#include "program/decimal_number.hpp"
+#include "program/table.hpp"
 
 namespace cairn::app {
 namespace {
@@ -56,21 +57,12 @@ std::string check_real(const OptionSpec& option, const std::string& text) {
 /// What is wrong with a value; empty: nothing. An empty word is what a script passes where a
 /// variable of its is not set.
 std::string check_value(const OptionSpec& option, std::string& text) {
+  if (option.type == OptionType::integer) return check_integer(option, text);
+  if (option.type == OptionType::real) return check_real(option, text);
   if (text.empty()) return "an empty word is no value; leave the option out";
-  switch (option.type) {
-    case OptionType::integer:
-      return check_integer(option, text);
-    case OptionType::real:
-      return check_real(option, text);
-    case OptionType::choice:
-      if (std::ranges::find(option.choices, text) != option.choices.end()) return {};
-      return fmt::format("'{}' is not one of {}", text, joined(option.choices, ", "));
-    case OptionType::boolean:
-    case OptionType::text:
-    case OptionType::component:
-      break;
-  }
-  return {};
+  const bool is_bad = option.type == OptionType::choice &&
+                      std::ranges::find(option.choices, text) == option.choices.end();
+  return is_bad ? fmt::format("'{}' is not one of {}", text, joined(option.choices, ", ")) : "";
 }
 
 constexpr std::size_t kLargestConfig = std::size_t{1} << 20;  // bytes; they have some hundred
@@ -136,6 +128,148 @@ void add_option(CLI::App& app, Slot& slot) {
       CLI::Validator([&option](std::string& text) { return check_value(option, text); }, ""));
 }
 
+/// The parser of one command line.
+class Parser {
+ public:
+  Parser(const OptionTable& common, std::span<const CommandEntry> commands,
+         std::span<const char* const> words);
+  ParseOutcome parse();
+
+ private:
+  struct Parsed {
+    const CommandEntry* command;
+    CLI::App* app;
+    std::deque<Slot> slots;
+  };
+
+  void add_config(const OptionSpec& option);
+  void add_command(const CommandEntry& command);
+  /// Whether the words may mean that command: a configuration file may have a section for any.
+  bool may_mean(const CommandEntry& command) const;
+  /// The app that holds a command: that of "study" for "study compact".
+  CLI::App& app_above(const std::string& name);
+  /// The innermost command that the words name, or null.
+  const Parsed* chosen() const;
+  ParseOutcome outcome();
+
+  std::span<const char* const> words_;
+  CLI::App app_;
+  std::deque<Slot> common_;
+  std::deque<Parsed> commands_;
+};
+
+Parser::Parser(const OptionTable& common, std::span<const CommandEntry> commands,
+               std::span<const char* const> words)
+    : words_(words) {
+  app_.name("cairn");
+  app_.fallthrough();
+  app_.require_subcommand(0, 1);
+  app_.set_help_flag("-h,--help");
+  app_.set_version_flag("--version", "");
+  for (const OptionSpec& option : common.specs()) {
+    if (option.name == "config") {
+      add_config(option);
+    } else {
+      add_option(app_, common_.emplace_back(Slot{.option = &option, .text = {}, .texts = {}}));
+    }
+  }
+  for (const CommandEntry& command : commands) add_command(command);
+}
+
+void Parser::add_config(const OptionSpec& option) {
+  app_.allow_config_extras(CLI::config_extras_mode::error);
+  app_.config_formatter(std::make_shared<BoundedConfig>());
+  app_.set_config("--config")
+      ->check(
+          CLI::Validator([&option](std::string& text) { return check_value(option, text); }, ""));
+}
+
+void Parser::add_command(const CommandEntry& command) {
+  CLI::App* const own = app_above(command.name()).add_subcommand(own_name(command));
+  Parsed& parsed = commands_.emplace_back(Parsed{&command, own, {}});
+  if (!may_mean(command)) return;
+  for (const OptionSpec& option : command.options())
+    add_option(*own, parsed.slots.emplace_back(Slot{.option = &option, .text = {}, .texts = {}}));
+}
+
+bool Parser::may_mean(const CommandEntry& command) const {
+  const auto is_config = [](std::string_view word) { return word.starts_with("--config"); };
+  if (std::ranges::any_of(words_, is_config)) return true;
+  std::istringstream name(command.name());
+  for (std::string part; name >> part;) {
+    if (std::ranges::find(words_, part) == words_.end()) return false;
+  }
+  return true;
+}
+
+CLI::App& Parser::app_above(const std::string& name) {
+  const std::size_t blank = name.find(' ');
+  if (blank == std::string::npos) return app_;
+  const auto above = std::ranges::find(commands_, name.substr(0, blank),
+                                       [](const Parsed& each) { return each.command->name(); });
+  above->app->require_subcommand(1);
+  return *above->app;
+}
+
+const Parser::Parsed* Parser::chosen() const {
+  const Parsed* innermost = nullptr;  // a command of a command comes after it
+  for (const Parsed& each : commands_) {
+    if (each.app->parsed()) innermost = &each;
+  }
+  return innermost;
+}
+
+ParseOutcome Parser::outcome() {
+  using Kind = ParseOutcome::Kind;
+  const auto failed = [](Kind kind, std::string message, std::vector<std::string> left = {}) {
+    ParseOutcome outcome;
+    outcome.kind = kind;
+    outcome.message = std::move(message);
+    outcome.words = std::move(left);
+    return outcome;
+  };
+  try {
+    app_.parse(static_cast<int>(words_.size()), words_.data());
+    return {};
+  } catch (const CLI::CallForHelp&) {
+    return failed(Kind::help, "");
+  } catch (const CLI::CallForVersion&) {
+    return failed(Kind::version, "");
+  } catch (const CLI::ConfigError& error) {
+    return failed(Kind::config_key, error.what());
+  } catch (const CLI::FileError& error) {
+    return failed(Kind::config_file, error.what());
+  } catch (const CLI::ParseError& error) {
+    // A misspelt option leaves its value behind, which then stands where another argument belongs:
+    // so unknown words are what went wrong first, whatever the parser complains of.
+    std::vector<std::string> left = app_.remaining(true);
+    const std::string message = error.what();
+    if (!left.empty()) return failed(Kind::unknown_words, message, std::move(left));
+    if (dynamic_cast<const CLI::RequiredError*>(&error) && chosen())
+      return failed(Kind::missing, message);
+    if (!dynamic_cast<const CLI::ArgumentMismatch*>(&error))
+      return failed(Kind::bad_value, message);
+    const bool repeated = message.find(": At Most ") != std::string::npos;  // CLI11's words
+    return failed(repeated ? Kind::repeated : Kind::without_value, message);
+  }
+}
+
+ParseOutcome Parser::parse() {
+  ParseOutcome result = outcome();
+  const Parsed* const of = chosen();
+  if (of) result.command = of->command;
+  if (result.kind != ParseOutcome::Kind::command) return result;
+  const CLI::Option* config = app_.get_config_ptr();
+  if (config && config->count() > 0) result.config_file = config->as<std::string>();
+  for (const Slot& slot : common_) slot.add_to(result.common);
+  if (!of) {
+    result.kind = ParseOutcome::Kind::nothing;
+    return result;
+  }
+  for (const Slot& slot : of->slots) slot.add_to(result.values);
+  return result;
+}
+
 }  // namespace
 
 std::string long_name(const OptionSpec& option) {
@@ -169,121 +303,9 @@ std::string shown_default(const OptionSpec& option) {
   return is_shown ? option.default_value : std::string();
 }
 
-struct OptionParser::Impl {
-  CLI::App app;
-  std::deque<Slot> common;
-  struct Parsed {
-    const Command* command;
-    CLI::App* app;
-    std::deque<Slot> slots;
-  };
-  std::deque<Parsed> commands;
-
-  /// The innermost command that the words name, if any.
-  const Parsed* chosen() const {
-    const Parsed* innermost = nullptr;  // a command of a command comes after it
-    for (const Parsed& each : commands) {
-      if (each.app->parsed()) innermost = &each;
-    }
-    return innermost;
-  }
-
-  std::string config_file() const {
-    const CLI::Option* option = app.get_config_ptr();
-    return option && option->count() > 0 ? option->as<std::string>() : "";
-  }
-
-  /// The app that holds the commands of a command: of "study" for "study compact".
-  CLI::App& app_above(const std::string& name) {
-    const std::size_t blank = name.find(' ');
-    if (blank == std::string::npos) return app;
-    const auto above = std::ranges::find(commands, name.substr(0, blank),
-                                         [](const Parsed& each) { return each.command->name; });
-    above->app->require_subcommand(1);
-    return *above->app;
-  }
-
-  ParseOutcome outcome_of(std::span<const char* const> words);
-};
-
-OptionParser::OptionParser(const OptionTable& common, std::span<const Command> commands)
-    : impl_(std::make_unique<Impl>()) {
-  CLI::App& app = impl_->app;
-  app.name("cairn");
-  app.fallthrough();
-  app.require_subcommand(0, 1);
-  app.set_help_flag("-h,--help");
-  app.set_version_flag("--version", "");
-  for (const OptionSpec& option : common.specs()) {
-    if (option.name == "config") {
-      app.allow_config_extras(CLI::config_extras_mode::error);
-      app.config_formatter(std::make_shared<BoundedConfig>());
-      app.set_config("--config")
-          ->check(CLI::Validator([&option](std::string& text) { return check_value(option, text); },
-                                 ""));
-    } else {
-      add_option(app, impl_->common.emplace_back(Slot{.option = &option, .text = {}, .texts = {}}));
-    }
-  }
-  for (const Command& command : commands) {
-    CLI::App& above = impl_->app_above(command.name);
-    CLI::App* const own = above.add_subcommand(command.name.substr(command.name.find(' ') + 1));
-    Impl::Parsed& parsed = impl_->commands.emplace_back(Impl::Parsed{&command, own, {}});
-    for (const OptionSpec& option : command.options.specs())
-      add_option(*own, parsed.slots.emplace_back(Slot{.option = &option, .text = {}, .texts = {}}));
-  }
-}
-
-OptionParser::~OptionParser() = default;
-
-ParseOutcome OptionParser::Impl::outcome_of(std::span<const char* const> words) {
-  using Kind = ParseOutcome::Kind;
-  const auto failed = [](Kind kind, std::string message, std::vector<std::string> left = {}) {
-    ParseOutcome outcome;
-    outcome.kind = kind;
-    outcome.message = std::move(message);
-    outcome.words = std::move(left);
-    return outcome;
-  };
-  try {
-    app.parse(static_cast<int>(words.size()), words.data());
-    return {};
-  } catch (const CLI::CallForHelp&) {
-    return failed(Kind::help, "");
-  } catch (const CLI::CallForVersion&) {
-    return failed(Kind::version, "");
-  } catch (const CLI::ConfigError& error) {
-    return failed(Kind::config_key, error.what());
-  } catch (const CLI::FileError& error) {
-    return failed(Kind::config_file, error.what());
-  } catch (const CLI::ParseError& error) {
-    // A misspelt option leaves its value behind, which then stands where another argument belongs:
-    // so unknown words are what went wrong first, whatever the parser complains of.
-    std::vector<std::string> left = app.remaining(true);
-    const std::string message = error.what();
-    if (!left.empty()) return failed(Kind::unknown_words, message, std::move(left));
-    if (dynamic_cast<const CLI::RequiredError*>(&error) && chosen())
-      return failed(Kind::missing, message);
-    if (!dynamic_cast<const CLI::ArgumentMismatch*>(&error))
-      return failed(Kind::bad_value, message);
-    const bool repeated = message.find(": At Most ") != std::string::npos;  // CLI11's words
-    return failed(repeated ? Kind::repeated : Kind::without_value, message);
-  }
-}
-
-ParseOutcome OptionParser::parse(std::span<const char* const> words) {
-  ParseOutcome outcome = impl_->outcome_of(words);
-  outcome.config_file = impl_->config_file();
-  const Impl::Parsed* const chosen = impl_->chosen();
-  if (chosen) outcome.command = chosen->command;
-  if (outcome.kind != ParseOutcome::Kind::command) return outcome;
-  for (const Slot& slot : impl_->common) slot.add_to(outcome.common);
-  if (!chosen) {
-    outcome.kind = ParseOutcome::Kind::nothing;
-    return outcome;
-  }
-  for (const Slot& slot : chosen->slots) slot.add_to(outcome.values);
-  return outcome;
+ParseOutcome parse_command_line(const OptionTable& common, std::span<const CommandEntry> commands,
+                                std::span<const char* const> words) {
+  return Parser(common, commands, words).parse();
 }
 
 }  // namespace cairn::app

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "cairn/plugin/options.hpp"
-#include "command.hpp"
+#include "program.hpp"
 
 namespace cairn::app {
 
@@ -43,26 +42,17 @@ struct ParseOutcome {
   std::string message;             ///< CLI11's
   std::vector<std::string> words;  ///< the unknown ones
 
-  const Command* command = nullptr;  ///< the innermost that the command line names, if any
-  OptionValues values;               ///< of its options, those that were given
-  OptionValues common;               ///< the same of those of every command
-  std::string config_file;           ///< that was read; empty if there was none
+  const CommandEntry* command = nullptr;  ///< the innermost that the command line names, if any
+  OptionValues values;                    ///< of its options, those that were given
+  OptionValues common;                    ///< the same of those of every command
+  std::string config_file;                ///< that was read; empty if there was none
 };
 
-/// Parses command lines: options of every command, which may stand before or after the command, and
-/// those of the command, from words or from a file in TOML.
-class OptionParser {
- public:
-  /// `common`: the options of every command; what is called `config` there names a file of options.
-  /// All of the arguments must live as long.
-  OptionParser(const OptionTable& common, std::span<const Command> commands);
-  ~OptionParser();
-
-  ParseOutcome parse(std::span<const char* const> words);
-
- private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
-};
+/// Parses a command line: options of every command (`common`), which may stand before or after the
+/// command, and those of the command, from words or from a file in TOML, which the common option
+/// `config` names. `words`: the program's name, and what was typed after it. Of commands that the
+/// words cannot mean the options are not asked for.
+ParseOutcome parse_command_line(const OptionTable& common, std::span<const CommandEntry> commands,
+                                std::span<const char* const> words);
 
 }  // namespace cairn::app

@@ -306,8 +306,8 @@ TEST_F(EvaluateByTime, WhatCannotBeDoneWithoutStampsSaysWhereTheyGo) {
   expect_refusal({"--offset", "1"}, 2, "--truth-stamps FILE");
   expect_refusal({"--match", "stamp"}, 2, "--truth-stamps FILE");
   expect_refusal({"--match", "id", "--offset", "1"}, 2, "leave out --offset");
-  expect_refusal({"--offset", "nan"}, 2, "'nan' is not a number of seconds");
-  expect_refusal({"--max-time-difference=-1"}, 2, "seconds, from 0");
+  expect_refusal({"--offset", "nan"}, 2, "'nan' is not a finite number");
+  expect_refusal({"--max-time-difference=-1"}, 2, "'-1' is not a finite number of 0 or more");
 }
 
 // Key frames with ids beside a truth with times: pose k is not row k.

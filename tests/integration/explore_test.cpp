@@ -316,7 +316,7 @@ TEST_F(Explore, WhatCannotWorkIsRefusedBeforeTheWork) {
   EXPECT_THAT(refusal({"--runs", "2", "--map", folder_.file("map.yaml")}, 2), HasSubstr("--map"));
   EXPECT_THAT(refusal({"--explorer", "frontier,frontir", "--runs", "2"}, 5), HasSubstr("frontir"));
   EXPECT_THAT(refusal({"--seed", "18446744073709551615", "--runs", "2"}, 2),
-              HasSubstr("give a smaller seed"));
+              HasSubstr("is not an integer from 0 to 1000000000000000"));
   EXPECT_THAT(refusal({"--start-x", "2", "--start-y", "2", "--start-theta", "nan"}, 2),
               HasSubstr("--start-theta: 'nan' is not a finite number"));
   EXPECT_THAT(refusal({"--lidar", "range=nan"}, 2), HasSubstr("range"));

@@ -433,7 +433,7 @@ TEST(Usage, IntegersAreDecimalAndInRange) {
   for (const char* seed : {"-1", "18446744073709551616", "1.5", "0x10", ""}) {
     expect_error(
         cairn({"generate", "ring:poses=9", "-o", "/dev/null", "--to", "g2o", "--seed", seed}),
-        kUsage, "is not an integer from 0 to 18446744073709551615");
+        kUsage, "is not an integer from 0 to 1000000000000000");
   }
   expect_error(cairn({"compact", "@ring:poses=9", "--begin", "99999999999999999999"}), kUsage,
                "is not an integer from -9223372036854775808");

@@ -28,6 +28,8 @@ const Names kLayers{"runtime", "types", "graph", "linear", "solve", "plugin"};
 /// Libraries beside plugins, which plugins (and libraries) may include.
 const Names kShared{"solvers/block", "solvers/linear/blas", "solvers/linear/iterative",
                     "solvers/nonlinear/descent"};
+/// What commands share: of the subjects' folders and the program alone.
+const std::string kProgram = "lib/program";
 /// Below the core: what everything may include, and includes nothing of cairn.
 const Names kBelow{"core/numeric/"};
 /// Of what lies below the core, the folders of public headers: several numbers at a time, arrays.
@@ -79,6 +81,7 @@ Names quoted_includes(const std::string& text) {
 
 /// The wing's folder that a file below the root lies in ("solvers/linear/pcg"); empty outside.
 std::string unit_of(const std::string& file) {
+  if (file.starts_with(kProgram + "/")) return kProgram;
   for (const std::string& shared : kShared) {
     if (file.starts_with(shared + "/")) return shared;
   }
@@ -123,6 +126,7 @@ class Tree {
  private:
   /// The layer or subject that a file of core or lib belongs to; empty elsewhere.
   std::string part_of(const std::string& file) const {
+    if (file.starts_with(kProgram + "/")) return {};  // no subject of the library
     const std::string core_headers = "core/include/cairn/", core_sources = "core/src/";
     for (const std::string& begin :
          {core_headers, core_sources, kBelow.front(), std::string("lib/")}) {
@@ -146,7 +150,8 @@ class Tree {
       if (layer < 0) return "the core includes nothing of lib";
       if (layer > position(kLayers, part_of(file))) return part + " is a later layer";
     }
-    if (file.starts_with("lib/") && subject > position(subjects_, part_of(file)))
+    if (file.starts_with("lib/") && !file.starts_with(kProgram + "/") &&
+        subject > position(subjects_, part_of(file)))
       return part + " is a later subject";
     return {};
   }
@@ -179,6 +184,9 @@ class Tree {
     }
     const std::string unit = unit_of(other);
     if (unit_of(file) == unit || position(kShared, unit) >= 0) return {};
+    if (unit == kProgram)
+      return file.starts_with("plugins/") || file.starts_with("apps/cairn/") ? ""
+                                                                             : "of commands alone";
     return unit + " is another plugin's folder";
   }
 
@@ -264,6 +272,18 @@ TEST_F(FaultyTree, PacksMayBeIncludedEverywhereAndIncludeNothingElse) {
   write("core/numeric/pack/include/cairn/pack/p.hpp",
         "#include \"cairn/memory/growing_array.hpp\"\n");
   EXPECT_THAT(faults(), ElementsAre(HasSubstr("each stands for itself")));
+}
+
+TEST_F(FaultyTree, WhatCommandsShareIsOfCommandsAlone) {
+  write("lib/program/table.hpp", "");
+  write("lib/program/report.cpp",
+        "#include \"cairn/update/u.hpp\"\n#include \"program/table.hpp\"\n");
+  for (const char* file : {"plugins/one/command.cpp", "apps/cairn/help.cpp"})
+    write(file, "#include \"program/table.hpp\"\n");
+  EXPECT_THAT(faults(), IsEmpty());
+  for (const char* file : {"types/one/t.cpp", "solvers/linear/one/one.cpp", "lib/update/src/u.cpp"})
+    write(file, "#include \"program/table.hpp\"\n");
+  EXPECT_THAT(faults(), SizeIs(3));
 }
 
 TEST_F(FaultyTree, LibInTheCoreIsAFault) {

@@ -45,7 +45,7 @@ for command in "${wanted[@]}"; do
 done
 
 # Which shared objects a command needs is seen from what happens without each: it ends well, or with 5 and the
-# name of what is missing. Nothing else is allowed, and listing always works.
+# name of what is missing. Nothing else is allowed, and listing always works where its own command is there.
 broken=0
 for library in "$work"/lib/cairn/*.so; do
   name=$(basename "$library")
@@ -57,13 +57,13 @@ for library in "$work"/lib/cairn/*.so; do
     "$cairn" $command --quiet >"$work/out" 2>&1 || status=$?
     if ((status == 5)) && grep -q "$name is missing" "$work/out"; then
       failures=$((failures + 1))
-      [[ $command != plugins ]] || fail "cairn plugins needs $name"
+      [[ $command != plugins || $name == commands.so ]] || fail "cairn plugins needs $name"
     elif ((status != 0)); then
       fail "without $name, cairn $command ended with $status: $(cat "$work/out")"
     fi
   done
   ((failures == 0)) || broken=$((broken + 1))
-  ((failures < ${#commands[@]} - 1)) || fail "no command but plugins works without $name"
+  [[ $name == commands.so ]] || ((failures < ${#commands[@]} - 1)) || fail "no command but plugins works without $name"
   printf 'without %-24s %d of %d commands work\n' "$name" $((${#commands[@]} - failures)) ${#commands[@]}
   mv "$work/aside" "$library"
 done

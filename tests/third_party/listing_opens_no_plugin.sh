@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# listing_opens_no_plugin.sh PREFIX: `cairn plugins` reads the small file beside each shared object, and opens none.
+# listing_opens_no_plugin.sh PREFIX: `cairn plugins` reads the small file beside each shared object, and opens none but the
+# one that it is in itself.
 set -euo pipefail
 prefix=$1
 work=$(mktemp -d)
@@ -22,7 +23,7 @@ opened() {
 
 count=$(find "$prefix/lib/cairn" -name '*.so' | wc -l)
 sidecars=$(opened json plugins | wc -l)
-libraries=$(opened so plugins)
+libraries=$(opened so plugins | grep -v '/commands.so"' || true) # that of the command itself
 if ((count == 0 || sidecars != count)); then
   echo "FAILED: $count plugins, but $sidecars sidecar files were read"
   exit 1

@@ -171,9 +171,11 @@ Sidecar read_sidecar(const fs::path& file) {
   };
   std::error_code unknown;
   if (!fs::is_regular_file(file, unknown)) throw broken("is not a regular file");
-  if (fs::file_size(file, unknown) > kLargestSidecar) throw broken("has more than 1 MB");
+  const std::uintmax_t size = fs::file_size(file, unknown);
+  if (!unknown && size > kLargestSidecar) throw broken("has more than 1 MB");
   std::ifstream stream(file, std::ios::binary);
-  const std::string text(std::istreambuf_iterator<char>(stream), {});
+  std::string text(unknown ? 0 : size, '\0');
+  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
   if (!stream && errno == ENOMEM) throw std::bad_alloc();
   if (!stream) throw broken("cannot be read");
   boost::system::error_code error;

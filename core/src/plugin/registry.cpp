@@ -305,14 +305,12 @@ struct Registry::Impl {
 Registry::Registry() : Registry(PluginSearch{}) {}
 
 Registry::Registry(const PluginSearch& search) : impl_(std::make_unique<Impl>()) {
-  std::vector<fs::path> seen;
+  std::set<std::string> seen;  // texts: paths are compared part by part, which takes long
   const auto add = [&](const Sidecar& sidecar) {
     std::error_code error;
     const fs::path canonical = fs::weakly_canonical(sidecar.library, error);
     if (error == std::errc::not_enough_memory) throw std::bad_alloc();
-    if (std::ranges::find(seen, canonical) != seen.end()) return;
-    seen.push_back(canonical);
-    impl_->add_plugin(sidecar);
+    if (seen.insert(canonical.native()).second) impl_->add_plugin(sidecar);
   };
   for (const fs::path& file : search.files) {
     // Named by the user: opened at once, so that what is wrong with it is said at once.
@@ -332,7 +330,7 @@ Registry::Registry(const PluginSearch& search) : impl_(std::make_unique<Impl>())
       if (entry.path().extension() == ".json") files.push_back(entry.path());
     }
     if (error == std::errc::not_enough_memory) throw std::bad_alloc();
-    std::ranges::sort(files);
+    std::ranges::sort(files, {}, &fs::path::native);
     for (const fs::path& file : files) {
       try {
         add(read_sidecar(file));

@@ -41,13 +41,21 @@ TEST(ComponentOptions, DefaultsParseBackToThemselves) {
           EXPECT_EQ(option_text(defaults.boolean(spec.name)), spec.default_value);
           break;
         case OptionType::integer:
+          EXPECT_EQ(defaults.absent(spec.name), spec.default_value.empty());
+          if (defaults.absent(spec.name)) break;
           EXPECT_EQ(option_text(defaults.integer(spec.name)), spec.default_value);
           break;
         case OptionType::real:
+          EXPECT_EQ(defaults.absent(spec.name), spec.default_value.empty());
+          if (defaults.absent(spec.name)) break;
           EXPECT_EQ(option_text(defaults.real(spec.name)), spec.default_value);
           break;
         case OptionType::component:
-          EXPECT_EQ(to_text(parse_component(spec.default_value)), spec.default_value);
+          for (const std::string& name : split_components(spec.default_value)) {
+            if (name.empty()) continue;  // none is chosen
+            const ComponentSpec chosen = parse_component(name);
+            EXPECT_EQ(parse_component(to_text(chosen)).values, chosen.values);
+          }
           [[fallthrough]];
         case OptionType::choice:
         case OptionType::text:

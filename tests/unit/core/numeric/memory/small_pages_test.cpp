@@ -63,7 +63,7 @@ TEST_F(SmallPages, ShareWhatThereIsButTakeNothingHuge) {
     const std::size_t before = bytes_advised_to_be_huge();
     const memory::SmallPages pages;
     small.emplace_back(3000 + k, -k);
-    EXPECT_EQ(bytes_advised_to_be_huge(), before);
+    EXPECT_LE(bytes_advised_to_be_huge(), before);  // what others gave back may go meanwhile
     if (k % 3 == 0) huge[static_cast<std::size_t>(k) / 2] = AlignedVector(4000, k);
   }
   const auto check = [&] {

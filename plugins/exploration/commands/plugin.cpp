@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/plugin/registry.hpp"
+
+namespace cairn::app {
+// One file each.
+void add_explore(Registrar& registrar);
+void add_map(Registrar& registrar);
+void add_study_objective(Registrar& registrar);
+void add_study_optimality(Registrar& registrar);
+}  // namespace cairn::app
+
+void cairn_register(cairn::Registrar& registrar) {
+  using namespace cairn::app;
+  add_explore(registrar);
+  add_map(registrar);
+  add_study_objective(registrar);
+  add_study_optimality(registrar);
+}

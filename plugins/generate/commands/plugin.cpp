@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/plugin/registry.hpp"
+
+namespace cairn::app {
+// One file each.
+void add_generate(Registrar& registrar);
+}  // namespace cairn::app
+
+void cairn_register(cairn::Registrar& registrar) {
+  using namespace cairn::app;
+  add_generate(registrar);
+}

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+#include "cairn/sparsification/redirection.hpp"
+#include "program/graph_files.hpp"
+#include "program/problem_setup.hpp"
+#include "program/session.hpp"
+
+namespace cairn::app {
+
+struct SparsifyCommandOptions {
+  std::string graph;
+  std::string output, output_format;
+  std::string sparsifier = "sparsify";
+  std::string select;
+  std::optional<std::int64_t> keep_every;
+  std::string edges;
+  std::string nodes = "poses";
+  std::string topology, recovery, population, scheme;
+  std::string optimizer = kDefaultOptimizer, linear_solver = kDefaultLinearSolver;
+  std::string estimator = "incremental_cholesky";
+  std::optional<std::int64_t> online;  ///< take nodes out every so many poses
+  bool as_given = false, no_kld = false;
+  InputOptions input;
+  ProblemOptions problem;
+  // Of studies:
+  bool is_study = false;  ///< new factors measure their blanket's own minimum, as in the thesis
+  std::string redirect = "late", redirect_to;
+  bool newer = false;
+  double inflation = RedirectionRule{}.inflation;
+  std::string information_frame = "second";
+  std::string compared_at = "common";
+  std::string record;
+
+  static OptionFields<SparsifyCommandOptions> fields();
+};
+
+/// Returns the exit code.
+int run_sparsify(SparsifyCommandOptions options, Session& session);
+
+}  // namespace cairn::app
