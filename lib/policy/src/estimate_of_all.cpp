@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include <fmt/core.h>
@@ -28,6 +29,13 @@ constexpr const char* kLoss = "geman_mcclure";
 /// degree of freedom, or what their covariances say: with three or six numbers one in 10¹⁰ is, or
 /// in 10⁸. Where more than a third of the loop closures seem to be, there is no saying which are.
 constexpr double kFarOff = 50.0, kFew = 1.0 / 3.0;
+/// Where covariances are larger than what they are of, chi2 says nothing, and wrong measurements
+/// bend the map at little cost. Then measurements are judged by each other alone: residuals that
+/// are not Gaussian have long tails, so that less is wrong, and only what is farther off.
+constexpr double kFarOffOthers = 200.0, kFewBesideOthers = 0.05;
+constexpr int kRounds = 3;  // each sees what was hidden beside what the one before has left out
+/// Residuals as small as rounding have no scale: chi2 per degree of freedom.
+constexpr double kWithoutNoise = 1e-9;
 /// So many of the least wrong are tried again without the others.
 constexpr std::size_t kTriedAgain = 20;
 /// Of what chi2 per degree of freedom is above one, so much has to be due to them.
@@ -89,8 +97,17 @@ bool is_large(const Minimum& minimum) {
   return minimum.per_dof > 1.0 + 4.0 * std::sqrt(2.0 / static_cast<double>(minimum.dof));
 }
 
+/// What is wrong.
+struct Measure {
+  double far_off = kFarOff;  ///< squared residuals above this many times the scale below
+  double least_scale = 1.0;  ///< of the others' chi2 per degree of freedom; 0: what that is
+  double most = kFew;        ///< part of the loop closures that may be
+  std::string loss = kLoss;
+};
+
 /// Of a graph at a robust estimate: the factors that contradict the others.
-std::vector<bool> far_off(const Graph& graph, const RejectedFactors& rejected) {
+std::vector<bool> far_off(const Graph& graph, const RejectedFactors& rejected,
+                          const Measure& measure) {
   std::vector<double> norms = squared_norms(graph);
   std::vector<bool> wrong(graph.factor_count());
   double dof = static_cast<double>(degrees_of_freedom(graph, resolve_gauge(graph)));
@@ -100,9 +117,14 @@ std::vector<bool> far_off(const Graph& graph, const RejectedFactors& rejected) {
   }
   double others = 0.0;
   for (std::size_t f = 0; f < norms.size(); ++f) others += wrong[f] ? 0.0 : norms[f];
-  const double scale = std::max(1.0, others / std::max(1.0, dof));
-  for (const int f : rejected.positions) wrong[f] = norms[f] > kFarOff * scale;
+  const double scale = std::max(measure.least_scale, others / std::max(1.0, dof));
+  for (const int f : rejected.positions) wrong[f] = norms[f] > measure.far_off * scale;
   return wrong;
+}
+
+/// Whether it is smaller than that.
+bool is_small(const Minimum& minimum) {
+  return minimum.per_dof < 1.0 - 4.0 * std::sqrt(2.0 / static_cast<double>(minimum.dof));
 }
 
 /// Some measurements left out, and the minimum of the others.
@@ -114,7 +136,7 @@ struct Explanation {
 
 /// Takes back, one by one, those of the factors left out with which chi2 hardly rises: beside
 /// others that are wrong, right ones seem to be as well.
-void take_back(Explanation& found, const PolicySetting& setting) {
+void take_back(Explanation& found, const Measure& measure, const PolicySetting& setting) {
   const Graph& recording = setting.data.recording;
   std::vector<std::pair<double, int>> by_residual;
   Graph with_all = found.rest.graph.clone();
@@ -129,8 +151,9 @@ void take_back(Explanation& found, const PolicySetting& setting) {
     Graph with = found.rest.graph.clone();
     with.add(recording.factor(f));
     const Minimum minimum = minimise(with, setting, false);
-    const double scale = std::max(1.0, found.minimum.per_dof);
-    const bool hardly = minimum.chi2 - found.minimum.chi2 < kFarOff * scale;
+    const double least = is_small(found.minimum) ? 0.0 : measure.least_scale;
+    const double scale = std::max(least, found.minimum.per_dof);
+    const bool hardly = minimum.chi2 - found.minimum.chi2 < measure.far_off * scale;
     if (minimum.status != Status::converged || !hardly) continue;
     found.rest.graph = std::move(with);
     found.rest.positions.push_back(f);
@@ -139,21 +162,30 @@ void take_back(Explanation& found, const PolicySetting& setting) {
   }
 }
 
+/// Whether chi2 is that much smaller without what is left out.
+bool explains(const Minimum& with_all, const Explanation& found, const Measure& measure) {
+  const double left = found.minimum.per_dof;
+  if (measure.least_scale > 0.0) return left - 1.0 <= (1.0 - kExplained) * (with_all.per_dof - 1.0);
+  const auto count = static_cast<double>(std::ssize(found.left_out));
+  return with_all.chi2 - found.minimum.chi2 >= count * measure.far_off * left;
+}
+
 /// What is wrong by a bounded loss on some factors; nothing where nothing is, or where that is too
 /// much, explains too little, or holds the graph together.
 std::optional<Explanation> explain(const Measured& all, const Minimum& with_all,
-                                   const FactorSelector& on, const PolicySetting& setting) {
+                                   const FactorSelector& on, const Measure& measure,
+                                   const PolicySetting& setting) {
   Explanation found{.rest = {all.graph.clone(), all.positions}, .left_out = {}, .minimum = {}};
   Graph& graph = found.rest.graph;
   const int components = resolve_gauge(graph).components;
   graph.set_values(setting.data.recording.values());
-  graph.set_loss(setting.registry.make<Loss>(kLoss), on);
+  graph.set_loss(setting.registry.make<Loss>(measure.loss), on);
   minimise(graph, setting);
   const RejectedFactors rejected = rejected_factors(graph);
-  const std::vector<bool> wrong = far_off(graph, rejected);
+  const std::vector<bool> wrong = far_off(graph, rejected, measure);
   for (std::size_t f = 0; f < wrong.size(); ++f)
     if (wrong[f]) found.left_out.push_back(found.rest.positions[f]);
-  const double most = kFew * static_cast<double>(rejected.loops);
+  const double most = measure.most * static_cast<double>(rejected.loops);
   if (found.left_out.empty() || static_cast<double>(std::ssize(found.left_out)) > most)
     return std::nullopt;
   graph.set_loss(nullptr);
@@ -161,29 +193,34 @@ std::optional<Explanation> explain(const Measured& all, const Minimum& with_all,
   if (resolve_gauge(graph).components != components) return std::nullopt;
   found.minimum = minimise(graph, setting, false);
   if (found.minimum.status != Status::converged) return std::nullopt;
-  if (found.minimum.per_dof - 1.0 > (1.0 - kExplained) * (with_all.per_dof - 1.0))
-    return std::nullopt;
-  take_back(found, setting);
+  if (!explains(with_all, found, measure)) return std::nullopt;
+  take_back(found, measure, setting);
   return found;
 }
 
 /// By as few wrong measurements as possible.
 std::optional<Explanation> explain(const Measured& all, const Minimum& with_all,
-                                   const PolicySetting& setting) {
-  std::optional<Explanation> loops = explain(all, with_all, FactorSelector::loops(), setting);
+                                   const Measure& measure, const PolicySetting& setting) {
+  std::optional<Explanation> loops =
+      explain(all, with_all, FactorSelector::loops(), measure, setting);
   if (loops && loops->left_out.size() == 1) return loops;
-  std::optional<Explanation> any = explain(all, with_all, FactorSelector::all(), setting);
+  std::optional<Explanation> any = explain(all, with_all, FactorSelector::all(), measure, setting);
   if (any && (!loops || any->left_out.size() < loops->left_out.size())) return any;
   return loops;
 }
 
-void leave_out(Explanation found, const Graph& recording, EstimateOfAll& all) {
+/// Leaves these out besides what is left out already.
+void leave_out(std::vector<int> factors, const Graph& recording, EstimateOfAll& all) {
+  factors.insert(factors.end(), all.left_out.begin(), all.left_out.end());
+  std::ranges::sort(factors);
+  all.left_out = std::move(factors);
+  all.left_out_on.clear();
+  all.loops_left_out = 0;
   const std::vector<bool> loops = loop_closures(recording);
-  for (const int f : found.left_out) {
+  for (const int f : all.left_out) {
     all.left_out_on.push_back(recording.factor(f).variables);
     all.loops_left_out += loops[static_cast<std::size_t>(f)];
   }
-  all.left_out = std::move(found.left_out);
 }
 
 }  // namespace
@@ -201,16 +238,33 @@ EstimateOfAll estimate_of_all(const PolicySetting& setting) {
   const bool own_losses = setting.loss || measured.graph.has_losses();
   if (setting.loss) measured.graph.set_loss(setting.loss, setting.loss_on);
   Minimum minimum = minimise(measured.graph, setting);
-  std::optional<Explanation> found;
-  if (!own_losses && is_large(minimum) && !setting.interrupted())
-    found = explain(measured, minimum, setting);
-  if (found) {
+  const auto leaves_out = [&](const Measure& measure) {
+    if (own_losses || setting.interrupted()) return false;
+    std::optional<Explanation> found = explain(measured, minimum, measure, setting);
+    if (!found || found->left_out.empty()) return false;
     minimum = found->minimum;
-    measured.graph = std::move(found->rest.graph);
-    leave_out(std::move(*found), setting.data.recording, all);
+    measured = std::move(found->rest);
+    leave_out(std::move(found->left_out), setting.data.recording, all);
+    return true;
+  };
+  if (is_large(minimum)) leaves_out({});
+  for (int round = 0; round < kRounds && minimum.per_dof > kWithoutNoise; ++round) {
+    // The loss leaves less than 1 % of their weight beyond three times its scale.
+    const double scale = std::sqrt(kFarOffOthers * minimum.per_dof) / 3.0;
+    if (!leaves_out({.far_off = kFarOffOthers,
+                     .least_scale = 0.0,
+                     .most = kFewBesideOthers,
+                     .loss = fmt::format("{}:scale={}", kLoss, scale)}))
+      break;
   }
   all.graph = std::move(measured.graph);
   all.chi2 = minimum.chi2;
+  if (!own_losses && is_large(minimum)) {
+    all.doubt = fmt::format(
+        "chi2 of all measurements is {:.3g} times their degrees of freedom, more than chance "
+        "allows: some contradict the others, or covariances are too small",
+        minimum.per_dof);
+  }
   if (minimum.status != Status::converged) {
     all.why_not =
         fmt::format("the optimisation of all measurements ended as {}", to_string(minimum.status));

@@ -82,6 +82,7 @@ class Maker {
       if (setting_.interrupted()) return;
       return fall_back(all_.why_not);
     }
+    if (!all_.doubt.empty()) note(all_.doubt);
     const std::string words = left_out_in_words(all_, data_);
     if (words.empty()) return;
     note(words);
