@@ -74,6 +74,7 @@ bool plain_name(std::string_view name) {
 
 /// What an option's value reads as, whatever its type.
 std::string read_back(const Options& options, const OptionSpec& spec) {
+  if (options.absent(spec.name)) return {};
   switch (spec.type) {
     case OptionType::boolean:
       return option_text(options.boolean(spec.name));
@@ -98,13 +99,16 @@ void check_spec(const OptionSpec& spec, const OptionTable& table, const Subject&
   check.expect(!spec.help.empty() && spec.help.find('\n') == std::string::npos,
                "every option has a line of help", [&] { return fmt::format("'{}'", spec.help); });
   if (spec.type == OptionType::choice) {
-    check.expect(std::ranges::find(spec.choices, spec.default_value) != spec.choices.end(),
-                 "the default is one of the choices",
-                 [&] { return fmt::format("it is '{}'", spec.default_value); });
+    const bool is_absent = spec.optional && spec.default_value.empty();
+    check.expect(
+        is_absent || std::ranges::find(spec.choices, spec.default_value) != spec.choices.end(),
+        "the default is one of the choices",
+        [&] { return fmt::format("it is '{}'", spec.default_value); });
   }
   if (spec.type == OptionType::component) {
-    check.expect(spec.choices.size() == 1, "an option for a component names its kind",
-                 [&] { return fmt::format("it names {}", spec.choices.size()); });
+    check.expect(std::ranges::all_of(spec.choices, plain_name),
+                 "the kinds of an option for a component are of a-z, 0-9 and _",
+                 [&] { return spec.choices.empty() ? "none" : spec.choices.front(); });
   }
   // The default, written down, is the default.
   const auto values_with = [&](const std::string& value) {

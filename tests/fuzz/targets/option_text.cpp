@@ -57,20 +57,25 @@ void expect_same_text(const ComponentSpec& spec) {
 /// The values are within what the table declares.
 void expect_in_range(const OptionTable& table, const Options& options) {
   for (const OptionSpec& spec : table.specs()) {
+    if (options.absent(spec.name)) {
+      expect(spec.optional, [&] { return spec.name + " is absent"; });
+      continue;
+    }
+    const auto is_allowed = [&](double value) {
+      return (value >= spec.minimum && value <= spec.maximum) || (spec.or_zero && value == 0.0);
+    };
     switch (spec.type) {
       case OptionType::boolean:
         options.boolean(spec.name);
         break;
       case OptionType::integer: {
         const auto value = static_cast<double>(options.integer(spec.name));
-        expect(value >= spec.minimum && value <= spec.maximum,
-               [&] { return fmt::format("{} is {}", spec.name, value); });
+        expect(is_allowed(value), [&] { return fmt::format("{} is {}", spec.name, value); });
         break;
       }
       case OptionType::real: {
         const double value = options.real(spec.name);
-        expect(value >= spec.minimum && value <= spec.maximum,
-               [&] { return fmt::format("{} is {}", spec.name, value); });
+        expect(is_allowed(value), [&] { return fmt::format("{} is {}", spec.name, value); });
         break;
       }
       case OptionType::choice:
