@@ -55,10 +55,10 @@ class Tidy(unittest.TestCase):
         database.write_text(json.dumps(self.entries))
         for file in (self.root / "clean").iterdir():
             file.unlink()
-        lines = "".join(f"key_of_{name} lib/{name}\n" for name in names)
+        keys = {f"lib/{name}": f"key_of_{name}" for name in names}
         out = io.StringIO()
-        with mock.patch("sys.stdin", io.StringIO(lines)), contextlib.redirect_stdout(out):
-            code = tidy.main(str(database), str(self.root / "clean"))
+        with contextlib.redirect_stdout(out):
+            code = tidy.check_all(database, self.root / "clean", keys)
         clean = {file.name.removeprefix("key_of_") for file in (self.root / "clean").iterdir()}
         return clean, out.getvalue(), code
 

@@ -1,14 +1,11 @@
-#!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
 """Runs clang-tidy on sources, several in one run, and remembers which are clean.
-
-    tidy.py DATABASE CLEAN < lines "key file"
 
 Parsing Eigen and the standard library takes most of the time of clang-tidy. So sources that are compiled and checked alike are
 put one after the other into one file, and parsed with it once; #line says which is which, so that all of them count as the
 main file, for which the compiler has warnings of its own. Where that finds anything, or names of two of them clash, the sources
 that are named and the others are tried by themselves, down to single files, whose verdict counts. What is clean is an empty file
-CLEAN/key.
+with the name of its key.
 
 A source must not get from an earlier one an #include that it lacks. Of most the compiler sees that; of one that is compiled
 with a precompiled header it does not see which of the files are missing that come with that header. So a source comes after
@@ -24,7 +21,6 @@ import re
 import shlex
 import shutil
 import subprocess
-import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -180,7 +176,7 @@ class Group:
 def in_groups(root: Path, sources: list[Source]) -> list[list[Source]]:
     """Sources that are compiled and checked alike, at most TOGETHER in each, each after sources that lack what it lacks; the
     largest groups first."""
-    alike: dict[tuple, list[Group]] = {}
+    alike: dict[tuple[object, ...], list[Group]] = {}
     for source in sorted(sources, key=lambda each: -len(each.lacks)):
         text = (root / source.file).read_text()
         names = declared(text)
@@ -245,28 +241,21 @@ class Linter:
         return "\n".join(line for line in done.stdout.splitlines() if not re.fullmatch(r"\d+ warnings? generated\.", line))
 
 
-def main(database: str, clean: str) -> int:
-    """Of the whole: the exit code."""
+def check_all(database: Path, clean: Path, keys: dict[str, str]) -> int:
+    """The sources that have a key, of a compilation database of the checkout that is the working directory. Each that is clean
+    gets its file in the folder `clean`; what is found is printed. Returns an exit code."""
     root = Path.cwd()
-    work = Path(database).parent / "units"
+    work = database.parent / "units"
     work.mkdir(parents=True, exist_ok=True)
-    keys = {}
-    for line in sys.stdin:
-        key, file = line.split()
-        keys[file] = key
     linter = Linter(root, work.resolve())
-    sources = read_sources(Path(database), root, keys)
+    sources = read_sources(database, root, keys)
     find_lacking(root, work, sources)
     failed = False
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         for result in pool.map(linter.check, in_groups(root, sources)):
             for source in result.clean:
-                (Path(clean) / source.key).touch()
+                (clean / source.key).touch()
             for text in result.output:
                 print(text, flush=True)
                 failed = True
     return 1 if failed else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main(*sys.argv[1:]))
