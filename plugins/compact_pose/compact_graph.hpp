@@ -15,9 +15,9 @@
 
 #include "cairn/geometry/motion.hpp"
 #include "cairn/geometry/pose_chain.hpp"
-#include "cairn/update/pose_remover.hpp"
 #include "cairn/policy/pose_policy.hpp"
 #include "cairn/solve/estimator.hpp"
+#include "cairn/update/pose_remover.hpp"
 #include "pose_index.hpp"
 #include "rigid_group.hpp"
 #include "temporary_poses.hpp"

@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "absolute.hpp"
-#include "cairn/update/pose_remover.hpp"
 #include "cairn/policy/pose_policy.hpp"
+#include "cairn/update/pose_remover.hpp"
 #include "compact_graph.hpp"
 #include "compact_pose_options.hpp"
 #include "consistency.hpp"

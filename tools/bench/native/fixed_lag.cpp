@@ -17,10 +17,10 @@
 #include <fmt/core.h>
 
 #include "cairn/io/format.hpp"
-#include "cairn/update/recorded_graph.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "cairn/solve/estimator.hpp"
+#include "cairn/update/recorded_graph.hpp"
 
 namespace cairn::performance {
 namespace {

@@ -17,12 +17,12 @@
 
 #include "cairn/io/generator.hpp"
 #include "cairn/lie/se2.hpp"
-#include "cairn/update/recorded_graph.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/solve/optimizer.hpp"
 #include "cairn/sparsification/measures.hpp"
 #include "cairn/types/loss.hpp"
+#include "cairn/update/recorded_graph.hpp"
 #include "support/components.hpp"
 #include "support/dense_system.hpp"
 

@@ -14,9 +14,9 @@
 #include <boost/math/distributions/normal.hpp>
 
 #include "cairn/geometry/pose_chain.hpp"
-#include "cairn/update/recorded_graph.hpp"
 #include "cairn/policy/registration.hpp"
 #include "cairn/solve/estimator.hpp"
+#include "cairn/update/recorded_graph.hpp"
 #include "support/pose_world.hpp"
 
 namespace cairn::compact {

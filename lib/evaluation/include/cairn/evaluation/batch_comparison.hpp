@@ -7,13 +7,13 @@
 
 #include "cairn/graph/graph.hpp"
 #include "cairn/linear/linear_solver.hpp"
-#include "cairn/update/recorded_graph.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/api.hpp"
 #include "cairn/solve/estimator.hpp"
 #include "cairn/solve/optimizer.hpp"
 #include "cairn/types/loss.hpp"
 #include "cairn/update/graph_update.hpp"
+#include "cairn/update/recorded_graph.hpp"
 
 namespace cairn {
 

@@ -13,10 +13,10 @@
 
 #include "cairn/io/stream_format.hpp"
 #include "cairn/online/line_session.hpp"
-#include "cairn/update/pose_remover.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/api.hpp"
 #include "cairn/solve/estimator.hpp"
+#include "cairn/update/pose_remover.hpp"
 
 namespace cairn {
 

@@ -11,11 +11,11 @@
 
 #include "cairn/geometry/motion.hpp"
 #include "cairn/geometry/pose_chain.hpp"
-#include "cairn/update/recorded_graph.hpp"
 #include "cairn/plugin/options.hpp"
 #include "cairn/policy/registration.hpp"
 #include "cairn/runtime/component.hpp"
 #include "cairn/solve/estimator.hpp"
+#include "cairn/update/recorded_graph.hpp"
 
 namespace cairn {
 

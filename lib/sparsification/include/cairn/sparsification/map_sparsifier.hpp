@@ -7,12 +7,12 @@
 #include <string>
 
 #include "cairn/graph/graph.hpp"
-#include "cairn/update/pose_remover.hpp"
 #include "cairn/plugin/options.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/api.hpp"
 #include "cairn/sparsification/selection.hpp"
 #include "cairn/sparsification/sparsifier.hpp"
+#include "cairn/update/pose_remover.hpp"
 
 namespace cairn {
 
