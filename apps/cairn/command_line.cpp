@@ -60,13 +60,21 @@ struct CompleteOptions {
   }
 };
 
+/// Whether it is `cairn complete -- WORD…`. Words that are being typed are not parsed: they may be
+/// options, or empty.
+bool is_being_typed(std::span<const char* const> words) {
+  return words.size() > 2 && words[1] == std::string_view(kComplete) &&
+         words[2] == std::string_view("--");
+}
+
 /// What `--plugin` names among the words: a plugin may bring a command, and so has to be there
 /// before they are understood.
 std::vector<std::string> named_plugins(std::span<const char* const> words) {
   constexpr std::string_view kOption = "--plugin";
   std::vector<std::string> files;
-  for (std::size_t k = 1; k < words.size(); ++k) {
+  for (std::size_t k = is_being_typed(words) ? 3 : 1; k < words.size(); ++k) {
     const std::string_view word = words[k];
+    if (word == "--") break;
     if (word == kOption && k + 1 < words.size()) files.emplace_back(words[++k]);
     if (word.starts_with(kOption) && word.substr(kOption.size()).starts_with('='))
       files.emplace_back(word.substr(kOption.size() + 1));
@@ -74,11 +82,18 @@ std::vector<std::string> named_plugins(std::span<const char* const> words) {
   return files;
 }
 
+/// An unknown name may be that of a plugin which could not be read.
+Error with_problems(const Error& error, const Registry& registry) {
+  std::string text = error.what();
+  for (const PluginProblem& problem : registry.problems())
+    text += fmt::format("\n  note: {}", problem.message);
+  return {error.code(), text};
+}
+
 /// The word that may name the command, if the words can mean no other: a configuration file may
 /// have a section for any.
 std::string_view first_command(std::span<const char* const> words) {
-  const auto is_config = [](std::string_view word) { return word.starts_with("--config"); };
-  return words.size() < 2 || std::ranges::any_of(words, is_config) ? "" : words[1];
+  return words.size() < 2 || std::ranges::any_of(words, is_config_option) ? "" : words[1];
 }
 
 Error nothing_found(const Registry& registry) {
@@ -263,6 +278,11 @@ CommandLine::CommandLine(Session& session, std::span<const char* const> words)
           .commands = {}} {
   if (words.size() == 2 && words[1] == std::string_view("--version")) return;
   session.common.plugins = named_plugins(words);
+  try {
+    static_cast<void>(session.registry());
+  } catch (const Error&) {  // said again once the words are understood, unless they ask for help
+    session.common.plugins.clear();
+  }
   program_.commands = commands_on_offer(first_command(words), session);
   if (program_.commands.empty()) throw nothing_found(session.registry());
   std::vector<std::string> names;
@@ -289,9 +309,7 @@ int CommandLine::complete(const std::vector<std::string>& words) {
 }
 
 std::function<int()> CommandLine::parse() {
-  // Words that are being typed are not parsed: they may be options, or empty.
-  if (words_.size() > 2 && words_[1] == std::string_view("complete") &&
-      words_[2] == std::string_view("--")) {
+  if (is_being_typed(words_)) {
     return [this, words = std::vector<std::string>(words_.begin() + 3, words_.end())] {
       return complete(words);
     };
@@ -308,7 +326,7 @@ std::function<int()> CommandLine::parse() {
     case ParseOutcome::Kind::config_file:
       throw Error(ErrorCode::input, fmt::format("--config: {}", outcome.message));
     case ParseOutcome::Kind::unknown_words:
-      throw unknown_word(outcome.words, program_, command);
+      throw with_problems(unknown_word(outcome.words, program_, command), session_.registry());
     case ParseOutcome::Kind::missing:
       throw missing(outcome.message, command);
     case ParseOutcome::Kind::without_value:

@@ -2,6 +2,7 @@
 #include "option_parser.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
@@ -20,6 +21,7 @@
 #include <CLI/Config.hpp>     // definitions that App.hpp only declares
 #include <CLI/Formatter.hpp>  // likewise
 
+#include "cairn/runtime/error.hpp"
 #include "program/decimal_number.hpp"
 #include "program/table.hpp"
 
@@ -102,13 +104,23 @@ std::string dashed(std::string name) {
   return name;
 }
 
-/// "-o,--output,output" in CLI11's words.
+/// What configuration files call an argument that is known by its place; it may have a name
+/// besides.
+std::string place_name(const OptionSpec& option) {
+  if (!option.form.named) return option.name;
+  std::string name = value_name(option);
+  std::ranges::transform(name, name.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return name;
+}
+
+/// "-o,--output,out" in CLI11's words.
 std::string names_of(const OptionSpec& option) {
   std::vector<std::string> names;
   for (std::string name : {short_name(option), long_name(option)}) {
     if (!name.empty()) names.push_back(std::move(name));
   }
-  if (option.form.positional) names.push_back(option.name);
+  if (option.form.positional) names.push_back(place_name(option));
   return joined(names, ",");
 }
 
@@ -144,8 +156,8 @@ class Parser {
 
   void add_config(const OptionSpec& option);
   void add_command(const CommandEntry& command);
-  /// Whether the words may mean that command: a configuration file may have a section for any.
-  bool may_mean(const CommandEntry& command) const;
+  /// Whether the words may mean that command.
+  bool is_named(const CommandEntry& command) const;
   /// The app that holds a command: that of "study" for "study compact".
   CLI::App& app_above(const std::string& name);
   /// The innermost command that the words name, or null.
@@ -187,14 +199,17 @@ void Parser::add_config(const OptionSpec& option) {
 void Parser::add_command(const CommandEntry& command) {
   CLI::App* const own = app_above(command.name()).add_subcommand(own_name(command));
   Parsed& parsed = commands_.emplace_back(Parsed{&command, own, {}});
-  if (!may_mean(command)) return;
-  for (const OptionSpec& option : command.options())
-    add_option(*own, parsed.slots.emplace_back(Slot{.option = &option, .text = {}, .texts = {}}));
+  const bool named = is_named(command);
+  if (!named && std::ranges::none_of(words_, is_config_option)) return;
+  try {
+    for (const OptionSpec& option : command.options())
+      add_option(*own, parsed.slots.emplace_back(Slot{.option = &option, .text = {}, .texts = {}}));
+  } catch (const Error&) {  // its plugin cannot be loaded, which concerns nobody else
+    if (named) throw;
+  }
 }
 
-bool Parser::may_mean(const CommandEntry& command) const {
-  const auto is_config = [](std::string_view word) { return word.starts_with("--config"); };
-  if (std::ranges::any_of(words_, is_config)) return true;
+bool Parser::is_named(const CommandEntry& command) const {
   std::istringstream name(command.name());
   for (std::string part; name >> part;) {
     if (std::ranges::find(words_, part) == words_.end()) return false;

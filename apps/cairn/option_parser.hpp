@@ -3,6 +3,7 @@
 
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "cairn/plugin/options.hpp"
@@ -22,6 +23,11 @@ std::string value_name(const OptionSpec& option);
 inline bool is_flag(const OptionSpec& option) { return option.type == OptionType::boolean; }
 /// Its default as the help shows it; empty: none is shown.
 std::string shown_default(const OptionSpec& option);
+
+/// Whether a word names a file of options.
+inline bool is_config_option(std::string_view word) {
+  return word == "--config" || word.starts_with("--config=");
+}
 
 /// How a command line was understood, or what kept it from being so.
 struct ParseOutcome {

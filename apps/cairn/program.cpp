@@ -57,7 +57,8 @@ bool can_be_added(std::string_view name, const std::vector<CommandEntry>& before
 
 std::vector<CommandEntry> commands_on_offer(std::string_view first, Session& session) {
   Registry& registry = session.registry();
-  const bool is_one = registry.has(Command::kKind, first);
+  const bool is_one = registry.has(Command::kKind, first) && is_command_name(first) &&
+                      first != kHelp && first != kComplete;
   std::vector<CommandEntry> commands;
   for (const std::string& name : registry.names(Command::kKind)) {
     const bool is_of_first = name == first || name.starts_with(std::string(first) + " ");

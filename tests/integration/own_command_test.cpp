@@ -56,6 +56,29 @@ TEST(OwnCommand, HasItsWordsCheckedAndASectionOfTheConfiguration) {
             "hello Ann!\nhello Ann!\nhello Ann!\n");
 }
 
+TEST(OwnCommand, WhosePluginIsNotThereConcernsNobodyElse) {
+  const std::string none = "/nowhere/plugin.so";
+  EXPECT_EQ(cairn({"--version", "--plugin", none}).exit_code, 0);
+  EXPECT_EQ(cairn({"info", "--help", "--plugin", none}).exit_code, 0);
+  EXPECT_THAT(cairn({"complete", "--", "optimize", "--plugin", "no"}).out, HasSubstr("\tfiles"));
+  EXPECT_EQ(cairn({"info", "@ring", "--plugin", none}).exit_code, 5);
+  EXPECT_EQ(cairn({"info", "@ring", "--plugin", ""}).exit_code, 2);
+  const TemporaryFolder folder;
+  write_text(folder.file("a.json"),
+             R"({"name": "a", "version": "1", "licence": "x", "description": "", "file": "a.so",
+                 "offers": [{"kind": "command", "name": "gone", "summary": "one"},
+                            {"kind": "command", "name": "help", "summary": "two"}]})");
+  write_text(folder.file("b.json"), "{");
+  const std::string config = folder.file("c.toml");
+  write_text(config, "[convert]\nin = \"@ring\"\nout = \"" + folder.file("ring.tum") + "\"\n");
+  const Environment found{{"CAIRN_PLUGIN_PATH", folder.path().string()}};
+  EXPECT_EQ(cairn({"convert", "--config", config}, found).exit_code, 0);
+  EXPECT_EQ(cairn({"help", "info"}, found).exit_code, 0);
+  EXPECT_EQ(cairn({"gone"}, found).exit_code, 5);
+  EXPECT_EQ(cairn({"study compact"}).exit_code, 2);
+  EXPECT_THAT(cairn({"none"}, found).err, HasSubstr("b.json"));
+}
+
 TEST(OwnCommand, WhoseNameIsNoWordIsNotThere) {
   const TemporaryFolder folder;
   write_text(folder.file("a.json"),
