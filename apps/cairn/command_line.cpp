@@ -82,7 +82,7 @@ std::vector<std::string> named_plugins(std::span<const char* const> words) {
   return files;
 }
 
-/// An unknown name may be that of a plugin which could not be read.
+/// What is missing may be in a plugin that could not be read.
 Error with_problems(const Error& error, const Registry& registry) {
   std::string text = error.what();
   for (const PluginProblem& problem : registry.problems())
@@ -97,11 +97,10 @@ std::string_view first_command(std::span<const char* const> words) {
 }
 
 Error nothing_found(const Registry& registry) {
-  std::string text =
-      "no plugins found; name their folder in CAIRN_PLUGIN_PATH, or a file with --plugin";
-  for (const PluginProblem& problem : registry.problems())
-    text += fmt::format("\n  note: {}", problem.message);
-  return {ErrorCode::plugin, text};
+  return with_problems({ErrorCode::plugin,
+                        "no plugins found; name their folder in CAIRN_PLUGIN_PATH, or a file with "
+                        "--plugin"},
+                       registry);
 }
 
 OptionTable common_options() {

@@ -47,7 +47,7 @@ bool can_be_added(std::string_view name, const std::vector<CommandEntry>& before
   const auto is_there = [&](std::string_view other) {
     return std::ranges::find(before, other, &CommandEntry::name) != before.end();
   };
-  if (is_there(name) || name == kHelp || name == kComplete) return false;
+  if (name == kHelp || name == kComplete) return false;
   const std::size_t blank = name.find(' ');
   if (blank == std::string_view::npos) return is_command_name(name);
   return is_there(name.substr(0, blank)) && is_command_name(name.substr(blank + 1));
@@ -57,8 +57,7 @@ bool can_be_added(std::string_view name, const std::vector<CommandEntry>& before
 
 std::vector<CommandEntry> commands_on_offer(std::string_view first, Session& session) {
   Registry& registry = session.registry();
-  const bool is_one = registry.has(Command::kKind, first) && is_command_name(first) &&
-                      first != kHelp && first != kComplete;
+  const bool is_one = registry.has(Command::kKind, first) && can_be_added(first, {});
   std::vector<CommandEntry> commands;
   for (const std::string& name : registry.names(Command::kKind)) {
     const bool is_of_first = name == first || name.starts_with(std::string(first) + " ");
