@@ -265,9 +265,11 @@ class CommandLineTest(unittest.TestCase):
             latex = (Path(place) / "latex" / "threads.tex").read_text(encoding="utf-8")
             entries = json.loads((folder / "threads.json").read_text(encoding="utf-8"))["entries"]
             written = page.read_text(encoding="utf-8")
+            full = (Path(place) / "data" / "threads.csv").read_text(encoding="utf-8")
         self.assertGreater(number(entries[0], "one.iteration"), number(entries[0], "one.factorize"))
         factorize = words.milliseconds(number(entries[0], 'two.factorize'))
-        self.assertIn(factorize, written)
+        self.assertIn(f",{factorize},", full)
+        self.assertIn("[threads.csv](data/threads.csv)", written)
         self.assertTrue(latex.startswith(r"\begin{tabular}{l") and factorize in latex and "Quick" not in latex, latex)
         self.assertRegex(written, r"\*Quick run, not a measurement\. .*; commit abc\.\*")
 

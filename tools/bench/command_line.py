@@ -7,9 +7,11 @@ import json
 import math
 from pathlib import Path
 
-from .pages import latex, put_into
+from .data import Row, brief, files_of
+from .pages import Sections, latex, put_into
 from .program import TINY, Cairn, Failed
 from .reports import Json, items, member, number, text
+from .shown import SHOWN
 from .studies import ALL
 from .studies.minimum import Peer
 from .study import Bench, Study, tell
@@ -20,13 +22,23 @@ def is_chosen(study: str, chosen: list[str]) -> bool:
     return not chosen or any(study == name or study.startswith(name + "_") for name in chosen)
 
 
+def machine_and_build(report: Json) -> str:
+    return (f"{text(report, 'machine.cpu')}, {number(report, 'machine.cores'):.0f} cores, {text(report, 'build.simd')}; "
+            f"{text(report, 'build.compiler')}, `{text(report, 'build.flags')}`")
+
+
 def provenance(report: Json) -> str:
     """"Measured on …", below each study's tables: they need not be of one day."""
     quick = "Quick run, not a measurement. " if member(report, "quick") is True else ""
     commit = text(report, "commit")
-    return (f"\n*{quick}{text(report, 'machine.cpu')}, {number(report, 'machine.cores'):.0f} cores, "
-            f"{text(report, 'build.simd')}; {text(report, 'build.compiler')}, `{text(report, 'build.flags')}`; "
-            f"{'commit ' + commit if commit else 'cairn ' + text(report, 'cairn')}.*\n")
+    return f"\n*{quick}{machine_and_build(report)}; {'commit ' + commit if commit else 'cairn ' + text(report, 'cairn')}.*\n"
+
+
+def about(report: Json) -> Row:
+    """The same, as columns that each row of a CSV ends with."""
+    quick = " --quick" if member(report, "quick") is True else ""
+    return {"command": f"./dev bench {text(report, 'study')}{quick}", "commit": text(report, "commit") or f"cairn {text(report, 'cairn')}",
+            "machine": machine_and_build(report).replace("`", "")}
 
 
 def finite(value: Json) -> Json:
@@ -69,8 +81,9 @@ def write_tables(arguments: argparse.Namespace) -> None:
         if not file.exists():
             continue
         report = json.loads(file.read_text(encoding="utf-8", errors="replace"))
-        for name, markdown in study.sections(items(report, "entries")).items():
-            put_into(pages, name, markdown + provenance(report))
+        sections = study.sections(items(report, "entries"))
+        write_sections(sections, report, arguments.tables, pages)
+        for name, markdown in sections.items():
             if arguments.latex and (tables := latex(markdown)):
                 (arguments.latex / f"{name}.tex").write_text(tables, encoding="utf-8")
         for name, content in study.files(items(report, "entries")).items():
@@ -78,6 +91,16 @@ def write_tables(arguments: argparse.Namespace) -> None:
     for page, content in zip(arguments.tables, pages):
         page.write_text(content, encoding="utf-8")
         tell(f"tables: {page}")
+
+
+def write_sections(sections: Sections, report: Json, files: list[Path], pages: list[str]) -> None:
+    """Each in short into the one of the pages that has a place for it, and in full into a folder `data` beside that."""
+    for name, markdown in sections.items():
+        at = put_into(pages, name, brief(name, markdown, SHOWN.get(name)) + provenance(report))
+        folder = files[at].parent / "data"
+        folder.mkdir(exist_ok=True)
+        for file, content in files_of(name, markdown, about(report)).items():
+            (folder / file).write_text(content, encoding="utf-8")
 
 
 def parse(words: list[str]) -> argparse.Namespace:
@@ -96,7 +119,7 @@ def parse(words: list[str]) -> argparse.Namespace:
                         help="minimum: another program, which is called with a g2o file and reports as cairn does")
     parser.add_argument("--quick", action="store_true", help="few and small graphs: shows that it works, no more")
     parser.add_argument("--check", action="store_true", help="only look at the arguments")
-    parser.add_argument("--tables", type=Path, nargs="+", metavar="PAGE", help="do not measure: fill in the tables of these")
+    parser.add_argument("--tables", type=Path, nargs="+", metavar="PAGE", help="do not measure: fill in the tables of these, and write them in full beside, as data/*.csv")
     parser.add_argument("--latex", type=Path, metavar="FOLDER", help="with --tables: the same tables in LaTeX too, a file NAME.tex each")
     arguments = parser.parse_intermixed_args(words)
     for name in arguments.studies:

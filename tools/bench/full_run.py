@@ -3,7 +3,7 @@
 
     python3 -m bench.full_run CAIRN [ARGUMENT...]
 
-ARGUMENT: as of `python3 -m bench`. In the root of a checkout; with --quick pages and pictures are copies in
+ARGUMENT: as of `python3 -m bench`. In the root of a checkout; with --quick pages, CSV files and pictures are copies in
 build/bench/quick.
 """
 from __future__ import annotations
@@ -52,7 +52,8 @@ def main(words: list[str]) -> int:
               or command_line.main([*begin, "--tables", *shown, "--latex", f"{folder}/latex"])
               or pictures.main([cairn, str(folder), str(images)]))
     if not failed:
-        print(f"\n{' '.join(shown)} have the tables, {folder}/latex the same in LaTeX, {folder}/*.json every run.")
+        print(f"\n{' '.join(shown)} have the tables in short, {pages[0].parent}/data/*.csv in full, {folder}/latex in LaTeX, "
+              f"{folder}/*.json every run.")
     return failed
 
 

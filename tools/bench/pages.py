@@ -53,7 +53,8 @@ def put(name: str, markdown: str, page: str) -> str:
     return before + begin + markdown + end + after
 
 
-def put_into(pages: list[str], name: str, markdown: str) -> None:
-    """Into the page that has a place for it. Raises ValueError if none has."""
+def put_into(pages: list[str], name: str, markdown: str) -> int:
+    """Into the page that has a place for it, which is returned. Raises ValueError if none has."""
     at = next((k for k, page in enumerate(pages) if marker(name) in page), 0)
     pages[at] = put(name, markdown, pages[at])
+    return at

@@ -97,8 +97,8 @@ def compare_table(entries: list[Json]) -> str:
         rows.append([text(entry, "name"), whole(of["steps"]), tenths(of["marginal_conservative"]),
                      digits(of["least_marginal_ratio"]), tenths(of["full_conservative"]), digits(of["least_full_ratio"]),
                      f"{least:.3g}" if math.isfinite(least) else "-"])
-    return table(["graph", "steps compared", "marginal covariances: not smaller", "least ratio",
-                  "full covariance: not smaller", "least ratio", "least eigenvalue"], rows)
+    return table(["graph", "steps compared", "marginal covariances: not smaller", "marginal covariances: least ratio",
+                  "full covariance: not smaller", "full covariance: least ratio", "least eigenvalue"], rows)
 
 
 def consistency_sections(entries: list[Json]) -> Sections:
@@ -124,8 +124,8 @@ def matches_sections(entries: list[Json]) -> Sections:
                          verdicts(c, "inconsistent"), verdicts(c, "waiting"), whole(median_of(c, "poses.kept")), digits(ate(c)),
                          times(ratio(ate(c), clean))])
         rows += named_once(some, text(entry, "name"))
-    return {"compact-matches": table(["graph", "false matches", "gate", "registered", "of them false", "loops kept",
-                                      "of them false", "refused", "waiting", "poses kept", "ATE [m]", "over clean"], rows)}
+    return {"compact-matches": table(["graph", "false matches", "gate", "registered", "registered, false", "loops kept",
+                                      "loops kept, false", "refused", "waiting", "poses kept", "ATE [m]", "over clean"], rows)}
 
 
 STUDIES = [Study("compact_consistency", study_consistency, consistency_sections),

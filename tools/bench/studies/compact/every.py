@@ -48,7 +48,8 @@ def sections(entries: list[Json]) -> Sections:
                      *distance(ours), digits(number(ours, "whole.kld")), whole(number(ours, "left_out")), digits(number(ours, "seconds")),
                      kept(robot, "poses"), kept(robot, "loops"), *distance(robot)[:1]])
     return {"compact-every": table(["graph", "strategy", "poses kept", "factors", "distance [m]", "of the extent", "KLD [nats]",
-                                    "left out", "time [s]", "`fpfl`: poses", "loop closures", "distance [m]"], rows)}
+                                    "left out", "time [s]", "`fpfl`: poses kept", "`fpfl`: loop closures",
+                                    "`fpfl`: distance [m]"], rows)}
 
 
 STUDIES = [Study("compact_every", study_every, sections)]

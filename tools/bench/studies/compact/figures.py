@@ -61,7 +61,8 @@ def sections(entries: list[Json]) -> Sections:
                 for strategy, title in [("apal", "(a) all poses, all loop closures"),
                                         ("apfl", "(b) all poses, few loop closures"), ("fpfl", "(c) few of both")]]
         rows += named_once(some, text(entry, "name"))
-    return {"compact-figures": table(["graph", "strategy", "poses", "of all", "loop closures", "of all", "ATE [m]", "[°]"], rows)}
+    return {"compact-figures": table(["graph", "strategy", "poses", "of all poses", "loop closures", "of all loop closures", "ATE [m]",
+                                      "ATE [°]"], rows)}
 
 
 STUDIES = [Study("compact_figures", study_figures, sections)]

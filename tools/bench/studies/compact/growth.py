@@ -91,8 +91,8 @@ def growth_table(entries: list[Json]) -> str:
         for c in [contestant(entry, "fpfl"), contestant(entry, "by_rule")]:
             row += [total(c), whole(median_of(c, "poses.kept")), whole(median_of(c, "loops.kept"))]
         rows.append(row)
-    return table(["laps", "poses", "loops", "APAL [s]", "FPFL [s]", "poses kept", "loops kept", "FPFL as published [s]",
-                  "poses kept", "loops kept"], rows)
+    return table(["laps", "poses", "loops", "APAL [s]", "FPFL [s]", "FPFL: poses kept", "FPFL: loops kept",
+                  "FPFL as published [s]", "FPFL as published: poses kept", "FPFL as published: loops kept"], rows)
 
 
 def nonzeros_table(entries: list[Json]) -> str:
@@ -130,7 +130,8 @@ def laps_table(entries: list[Json]) -> str:
         rows += named_once([[whole(number(after, of)) for of in ["laps", "poses", "loops"]] for after in items(entry, "after")],
                            title)
     return (table(["strategy", "laps", "poses kept", "loops kept"], rows) + "\n"
-            + table(["strategy", "all [s]", "median step, first quarter [ms]", "99 %", "median step, last quarter", "99 %"], steps))
+            + table(["strategy", "all [s]", "median step, first quarter [ms]", "99 %, first quarter [ms]", "median step, last quarter [ms]",
+                     "99 %, last quarter [ms]"], steps))
 
 
 def sections(entries: list[Json]) -> Sections:

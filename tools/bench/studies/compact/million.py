@@ -153,7 +153,7 @@ def sections(entries: list[Json]) -> Sections:
     return {"compact-million": table(["poses driven", "poses kept", "factors", "memory [MB]", "median step [ms]", "99 %",
                                       "longest", "matches asked for, per pose", "poses that leave",
                                       "ATE of the poses kept [m]"], drive),
-            "compact-million-errors": table(["estimate", "poses", "ATE [m]", "[deg]"], errors)}
+            "compact-million-errors": table(["estimate", "poses", "ATE [m]", "ATE [°]"], errors)}
 
 
 STUDIES = [Study("compact_million", study_million, sections)]

@@ -83,7 +83,7 @@ def gain_sections(entries: list[Json]) -> Sections:
                          digits(number(run, "run.errors.v2.ate.rotation")), over(error, apal)])
         rows += named_once(some, text(entry, "name"))
     return {"compact-gain": table(["graph", "threshold over the rule's", "gain threshold [nats]", "loops kept", "of all",
-                                   "ATE [m]", "[°]", "over APAL's"], rows)}
+                                   "ATE [m]", "ATE [°]", "over APAL's"], rows)}
 
 
 def gain_curves(entries: list[Json]) -> dict[str, str]:
@@ -115,8 +115,8 @@ def live_sections(entries: list[Json]) -> Sections:
             row += [digits(error_of(contestant(entry, name), f"ate.{of}", "likely")) for of in ["translation", "rotation"]]
         rows.append(row)
     return {"compact-live": table(["graph", "poses kept", "of", "loops kept", "pairs asked for per pose", "per loop kept",
-                                   "memory [MB]", "ATE [m]", "[°]", "all loops [m]", "[°]", "random [m]", "[°]",
-                                   "odometry [m]", "[°]"], rows)}
+                                   "memory [MB]", "ATE [m]", "ATE [°]", "all loops: ATE [m]", "all loops: ATE [°]",
+                                   "random: ATE [m]", "random: ATE [°]", "odometry: ATE [m]", "odometry: ATE [°]"], rows)}
 
 
 STUDIES = [Study("compact_gain", study_gain, gain_sections, gain_curves), Study("compact_live", study_live, live_sections)]

@@ -160,8 +160,8 @@ def errors_table(entries: list[Json]) -> str:
                              "" if strategy == "APAL" else over(errors[0], errors_of_paper(entry, "APAL")[0]),
                              over(errors[0], errors_of_paper(entry, "FPFL")[0]) if strategy == "RFPFL" else ""])
         rows += named_once(some, with_dagger(entry))
-    return table(["graph", "strategy", "ATE [m]", "[°]", "RPE [m]", "[°]", "all to all [m]", "[°]", "ATE over APAL's",
-                  "over FPFL's"], rows)
+    return table(["graph", "strategy", "ATE [m]", "ATE [°]", "RPE [m]", "RPE [°]", "all to all [m]", "all to all [°]",
+                  "ATE over APAL's", "ATE over FPFL's"], rows)
 
 
 def control_table(entries: list[Json]) -> str:
@@ -178,7 +178,7 @@ def control_table(entries: list[Json]) -> str:
                              times(min(ratios)), times(median(ratios)), times(max(ratios))])
         rows += named_once(some, text(entry, "name"))
     return table(["graph", "drawn first", "poses kept", "loops kept", "FPFL's loops", "converged",
-                  "ATE over FPFL's: least", "median", "most"], rows)
+                  "ATE over FPFL's: least", "ATE over FPFL's: median", "ATE over FPFL's: most"], rows)
 
 
 def recovery_table(entries: list[Json]) -> str:
@@ -193,7 +193,8 @@ def recovery_table(entries: list[Json]) -> str:
             if math.isfinite(errors[0]):
                 paper.append([f"the paper's {recovery}", *map(digits, errors)])
         rows += named_once(some + paper, text(entry, "name"))
-    return table(["graph", "recovery", "ATE [m]", "[°]", "RPE [m]", "[°]", "all to all [m]", "[°]"], rows)
+    return table(["graph", "recovery", "ATE [m]", "ATE [°]", "RPE [m]", "RPE [°]", "all to all [m]", "all to all [°]"],
+                 rows)
 
 
 def sections(entries: list[Json]) -> Sections:

@@ -152,11 +152,10 @@ def recovery_tables(entries: list[Json]) -> str:
                          *(digits(1e6 * of(loose, method, "seconds.recovery_median")) for method in METHODS)])
             title = ""
         checked += [(entry, tolerance) for entry, tolerance in [(loose, "1e-3"), (tight, "1e-6")] if loose and entry]
-    columns = [f"above the least, to {tolerance}: `{method}`" if method == METHODS[0] else f"`{method}`"
-               for tolerance in ["1e-3", "1e-6"] for method in METHODS]
+    columns, worked = ([f"{what}: `{method}`" for what in both for method in METHODS] for both in [
+        ["above the least, to 1e-3", "above the least, to 1e-6"], ["iterations", "median time [µs]"]])
     return (table(["recorded", "nodes", "problems", "factors", "KLD", *columns], excess) + "\n"
-            + table(["recorded", "nodes", "iterations, `fd`", "`ncfd`", "`ip`", "`pqn`", "median time [µs], `fd`", "`ncfd`",
-                     "`ip`", "`pqn`"], work) + "\n" + failures(checked))
+            + table(["recorded", "nodes", *worked], work) + "\n" + failures(checked))
 
 
 def initial_table(entries: list[Json]) -> str:
@@ -191,7 +190,7 @@ def topologies_table(entries: list[Json]) -> str:
                          *(nats(of(topology, "kld")) for topology in TOPOLOGIES),
                          *(digits(1e6 * of(topology, "seconds.topology")) for topology in TOPOLOGIES)])
             title = ""
-    columns = [f"{what if topology == TOPOLOGIES[0] else ''}`{topology}`" for what in ["KLD, ", "time [µs], "]
+    columns = [f"{what}: `{topology}`" for what in ["KLD", "time [µs]"]
                for topology in TOPOLOGIES]
     return table(["recorded", "nodes", "problems", "factors", *columns], rows)
 

@@ -121,7 +121,7 @@ def counts_table(entries: list[Json]) -> str:
                 problems.append(beside(whole(median_of(c, "problems.count")), theirs["problems"]))
                 blankets.append(beside(f"{median_of(c, 'problems.mean_blanket'):.2f}", theirs["blanket"]))
             rows.append([graph, scheme, topology, *problems, *blankets])
-    columns = [f"{what if k == KEEP_EVERY[0] else ''}{k}" for what in ["problems, N = ", "nodes of a blanket, N = "]
+    columns = [f"{what}, N = {k}" for what in ["problems", "nodes of a blanket"]
                for k in KEEP_EVERY]
     return table(["graph", "scheme", "topology", *columns], rows)
 
@@ -137,8 +137,8 @@ def recovery_table(entries: list[Json]) -> str:
                 rows.append([*cells, recovery, digits(kld), printed(theirs["kld"]), against(kld, theirs["kld"]),
                              digits(median_of(c, "rmse")), printed(theirs["rmse"]), total(c), printed(theirs["seconds"])])
                 cells = ["", "", ""]
-    return table(["graph", "scheme", "N", "by", "KLD", "thesis's", "ratio", "RMSE [m]", "thesis's", "time [s]", "thesis's"],
-                 rows)
+    return table(["graph", "scheme", "N", "by", "KLD", "thesis's KLD", "KLD / thesis's", "RMSE [m]", "thesis's RMSE [m]",
+                  "time [s]", "thesis's time [s]"], rows)
 
 
 def ratios_table(entries: list[Json]) -> str:
@@ -159,8 +159,8 @@ def ratios_table(entries: list[Json]) -> str:
             extremes = [times(extreme) for some in [kld, rmse]
                         for extreme in ([median(some), min(some), max(some)] if some else [NONE] * 3)]
             rows.append([recovery, str(len(kld)), *extremes, times(median(time))])
-    return table(["by", "compared", "KLD, ours over the thesis's: median", "least", "largest", "RMSE: median", "least",
-                  "largest", "time, the thesis's over ours: median"], rows)
+    return table(["by", "compared", *(f"{of} / thesis's: {which}" for of in ["KLD", "RMSE"] for which in ["median", "least", "largest"]),
+                  "thesis's time / ours: median"], rows)
 
 
 def common_table(entries: list[Json]) -> str:
@@ -172,8 +172,8 @@ def common_table(entries: list[Json]) -> str:
             rows.append([text(entry, "name"), text(entry, "scheme"), str(keep_every_of(entry)),
                          *(digits(median_of(c, of)) for c in contestants for of in ["kld", "rmse_aligned"]),
                          digits(median_of(contestants[-1], "rmse_full"))])
-    return table(["graph", "scheme", "N", "`clt`: KLD", "aligned RMSE [m]", "`mi`, `ncfd`: KLD", "aligned RMSE [m]",
-                  "default: KLD", "aligned RMSE [m]", "RMSE from all measurements [m]"], rows)
+    return table(["graph", "scheme", "N", *(f"{which}: {of}" for which in ["`clt`", "`mi`, `ncfd`", "default"]
+                                             for of in ["KLD", "aligned RMSE [m]"]), "default: RMSE from all measurements [m]"], rows)
 
 
 def topology_table(entries: list[Json]) -> str:
@@ -190,8 +190,8 @@ def topology_table(entries: list[Json]) -> str:
                          digits(median_of(c, "seconds.topology")), printed(theirs["topology_seconds"]),
                          whole(median_of(c, "factors.out")), printed(theirs["factors"])])
             graph = ""
-    return table(["graph", "population and topology", "KLD", "thesis's", "ratio", "RMSE [m]", "thesis's", "time [s]",
-                  "thesis's", "of that topology [s]", "thesis's", "factors", "thesis's"], rows)
+    return table(["graph", "population and topology", "KLD", "thesis's KLD", "KLD / thesis's", "RMSE [m]", "thesis's RMSE [m]",
+                  "time [s]", "thesis's time [s]", "topology [s]", "thesis's topology [s]", "factors", "thesis's factors"], rows)
 
 
 def regularization_table(entries: list[Json]) -> str:
@@ -202,8 +202,8 @@ def regularization_table(entries: list[Json]) -> str:
             theirs = said("vallve2018_losses", "kld", graph=text(entry, "name"), scheme="single", by=recovery, keep_every=5)
             klds = [median_of(contestant_of(entry, f"{topology}:epsilon={epsilon}"), "kld") for epsilon in EPSILONS]
             rows.append([text(entry, "name"), f"`{topology}`", *map(digits, klds), printed(theirs)])
-    return table(["graph", "topology", "KLD with ε = 1 in Λ's units", "of its mean diagonal: 1", "0.1", "0.01", "0.0001",
-                  "thesis's"], rows)
+    return table(["graph", "topology", "KLD, ε = 1 in Λ's units",
+                  *(f"KLD, ε = {epsilon} of the mean diagonal" for epsilon in ["1", "0.1", "0.01", "0.0001"]), "thesis's KLD"], rows)
 
 
 def sets_sections(entries: list[Json]) -> Sections:
