@@ -93,6 +93,17 @@ class BriefTest(unittest.TestCase):
 
 
 class FilesTest(unittest.TestCase):
+    def test_where_nothing_is_but_a_link_the_commit_is_in_the_csv_alone(self):
+        report_of = {**report("graphs"), "entries": []}
+        with tempfile.TemporaryDirectory() as place:
+            page = Path(place) / "page.md"
+            page.write_text("<!-- table:parts -->\n<!-- /table -->\n", encoding="utf-8")
+            pages_of = [page.read_text(encoding="utf-8")]
+            section = pages.table(["graph", "ms"], [["town", "1"]])
+            command_line.write_sections({"parts": section}, report_of, [page], pages_of)
+            self.assertEqual(pages_of, ["<!-- table:parts -->\nIn full: [parts.csv](data/parts.csv) (1 row).\n<!-- /table -->\n"])
+            self.assertIn(",abc1234,", (Path(place) / "data" / "parts.csv").read_text(encoding="utf-8"))
+
     def test_the_csv_is_beside_the_page_with_the_commit(self):
         threads = report("threads", {"name": "torus", "one": {"iteration": 0.04, "factorize": 0.03},
                                      "two": {"iteration": 0.025, "factorize": 0.015}})

@@ -96,7 +96,9 @@ def write_tables(arguments: argparse.Namespace) -> None:
 def write_sections(sections: Sections, report: Json, files: list[Path], pages: list[str]) -> None:
     """Each in short into the one of the pages that has a place for it, and in full into a folder `data` beside that."""
     for name, markdown in sections.items():
-        at = put_into(pages, name, brief(name, markdown, SHOWN.get(name)) + provenance(report))
+        shown = brief(name, markdown, SHOWN.get(name))
+        only_a_link = shown.startswith("In full:") and shown.count("\n") == 1  # to what has all of it
+        at = put_into(pages, name, shown if only_a_link else shown + provenance(report))
         folder = files[at].parent / "data"
         folder.mkdir(exist_ok=True)
         for file, content in files_of(name, markdown, about(report)).items():
