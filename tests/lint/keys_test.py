@@ -87,6 +87,13 @@ class Keys(Checkout):
         self.assertEqual(self.changed_by("lib/other/base.hpp"), {THIRD})
         self.assertEqual(self.changed_by("lib/part/src/round.hpp"), {THIRD})
 
+    def test_what_moves_as_it_is_keeps_its_key(self) -> None:
+        before = self.keys()
+        (self.root / "lib").rename(self.root / "plugins")
+        database = self.database(self.root).replace("/lib/", "/plugins/").replace("-I", "-isystem /usr/include/eigen3 -I")
+        after = keys.keys_of(self.root, database, b"14")
+        self.assertEqual({name.replace("lib/", "plugins/", 1): key for name, key in before.items()}, after)
+
     def test_a_new_header_of_the_same_ending_does_so_too(self) -> None:
         self.assertEqual(self.changed_by("lib/new/part/derived.hpp"), {FIRST})
         self.assertEqual(self.changed_by("lib/new/unheard_of.hpp"), set())

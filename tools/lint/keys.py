@@ -3,13 +3,15 @@
 
 That is the source itself, every header that it may include, the files with the checks, tools/lint, how the source is
 compiled, and the versions of clang-tidy and of the packages whose headers it includes. Nothing of it depends on where
-the checkout lies, so that all checkouts share what was found clean.
+the checkout lies, so that all checkouts share what was found clean, nor on the folders in it: what has moved as it is
+stays clean.
 """
 from __future__ import annotations
 
 import hashlib
 import json
 import re
+import shlex
 import subprocess
 from collections import defaultdict
 from collections.abc import Iterable
@@ -56,12 +58,24 @@ class Includes:
         return reached
 
 
+def flags_of(command: str) -> str:
+    """A compiler's command without names of files and folders: what is found in them is in the key by itself."""
+    words = iter(shlex.split(command)[1:])
+    flags = []
+    for word in words:
+        if word in ("-o", "-c", "-isystem", "-MF", "-MT", "-MQ", "-include"):
+            next(words)
+        elif word.startswith("-") and not word.startswith("-I"):
+            flags.append(word)
+    return " ".join(flags)
+
+
 def commands_in(database: str, root: Path) -> dict[str, list[str]]:
-    """How each source is compiled, by a compilation database in JSON, without the place of the checkout."""
+    """How each source is compiled, by a compilation database in JSON, without places."""
     result = defaultdict(list)
     for entry in json.loads(database):
         file, command = (entry[name].replace(f"{root}/", "") for name in ("file", "command"))
-        result[file].append(command)
+        result[file].append(flags_of(command))
     return result
 
 
@@ -87,6 +101,7 @@ def keys_of(root: Path, database: str, tools: bytes) -> dict[str, str]:
     result = {}
     for file, commands in sorted(commands_in(database, root).items()):
         if file in texts:  # rather than written by CMake
-            parts = [common.hexdigest(), *commands, *(f"{each} {hashes[each]}" for each in sorted(includes.reached(file)))]
+            parts = [common.hexdigest(), "tests" if file.startswith("tests/") else "", *commands, hashes[file],
+                     *sorted(f"{Path(each).name} {hashes[each]}" for each in includes.reached(file))]
             result[file] = hashlib.sha256("\n".join(parts).encode()).hexdigest()
     return result
