@@ -21,6 +21,7 @@
 # - where no build type is given, it is Release: without optimisation a plugin is tens of times slower;
 # - without LICENCE, the licence is "unstated".
 
+include(${CMAKE_CURRENT_LIST_DIR}/CairnLayer.cmake)
 set(CAIRN_PLUGIN_TEMPLATE_FOLDER ${CMAKE_CURRENT_LIST_DIR})
 
 # Settings of another project's plugins.
@@ -89,6 +90,13 @@ function(cairn_add_plugin)
            "    {\"kind\": \"${CMAKE_MATCH_1}\", \"name\": \"${CMAKE_MATCH_2}\", \"summary\": \"${CMAKE_MATCH_3}\"}")
   endforeach()
 
+  cairn_layers_of(layers ${arg_LIBRARIES})
+  set(cpp_layer_headers "")
+  set(cpp_layers "")
+  foreach(layer IN LISTS layers)
+    string(APPEND cpp_layer_headers "#include \"cairn/abi/${layer}.hpp\"\n")
+    string(APPEND cpp_layers "    {\"${layer}\", CAIRN_ABI_TAG_${layer}, cairn_abi_${layer}},\n")
+  endforeach()
   set(target cairn_plugin_${arg_NAME})
   set(manifest ${CMAKE_CURRENT_BINARY_DIR}/${arg_NAME}_manifest.cpp)
   configure_file(${CAIRN_PLUGIN_TEMPLATE_FOLDER}/plugin_manifest.cpp.in ${manifest} @ONLY)
@@ -138,7 +146,8 @@ endfunction()
 # - name.check runs the conformance suite over it in a process of its own, `cairn plugins --check` with the ARGUMENTS, such
 #   as --seconds 120 or --types slam3d:metric=g2o. It needs the program, which is looked for beside the library and on the
 #   PATH; CAIRN_PROGRAM names another. Without one there is a line when configuring, and no such test.
-# - name.test, with SOURCES: a program of these, name_test, with the library cairn::slam, which is given the plugin's path.
+# - name.test, with SOURCES: a program of these, name_test, with cairn::slam and what the plugin is linked with, which is given
+#   the plugin's path.
 function(cairn_add_plugin_tests)
   cmake_parse_arguments(PARSE_ARGV 0 arg "" "NAME" "SOURCES;ARGUMENTS")
   if(arg_UNPARSED_ARGUMENTS)
@@ -158,7 +167,8 @@ function(cairn_add_plugin_tests)
   endif()
   if(arg_SOURCES)
     add_executable(${arg_NAME}_test ${arg_SOURCES})
-    target_link_libraries(${arg_NAME}_test PRIVATE cairn::slam)
+    get_target_property(libraries cairn_plugin_${arg_NAME} LINK_LIBRARIES)
+    target_link_libraries(${arg_NAME}_test PRIVATE cairn::slam ${libraries})
     add_test(NAME ${arg_NAME}.test COMMAND ${arg_NAME}_test $<TARGET_FILE:cairn_plugin_${arg_NAME}>)
   endif()
 endfunction()

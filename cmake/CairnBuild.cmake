@@ -79,10 +79,3 @@ function(cairn_tell_of_sanitizers target)
     target_compile_definitions(${target} PRIVATE CAIRN_SANITIZED)
   endif()
 endfunction()
-
-# cairn_command_settings(target): how commands, and what they share, are compiled. What takes time lies in the libraries and
-# plugins, whose flags are untouched: it is worth no more than -Og here.
-function(cairn_command_settings target)
-  target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-Og>)
-  cairn_tell_of_sanitizers(${target})
-endfunction()

@@ -7,9 +7,9 @@ include(CMakePackageConfigHelpers)
 
 set(CAIRN_PACKAGE_FOLDER ${CMAKE_INSTALL_LIBDIR}/cmake/cairn)
 
-install(TARGETS cairn_core cairn_lie cairn_slam EXPORT cairn-targets
+install(TARGETS cairn_core cairn_lie EXPORT cairn-targets
         LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT libraries NAMELINK_COMPONENT development)
-foreach(folder IN LISTS CAIRN_PUBLIC_FOLDERS ITEMS ${CAIRN_GENERATED_FOLDER})
+foreach(folder IN LISTS CAIRN_PUBLIC_FOLDERS ITEMS ${CAIRN_GENERATED_FOLDER})  # those of layers install their own
   install(DIRECTORY ${folder}/cairn DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development
           FILES_MATCHING PATTERN "*.hpp")
 endforeach()
@@ -24,7 +24,8 @@ configure_package_config_file(cmake/cairnConfig.cmake.in ${CMAKE_CURRENT_BINARY_
 write_basic_package_version_file(${CMAKE_CURRENT_BINARY_DIR}/cairnConfigVersion.cmake
                                  COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/cairnConfig.cmake ${CMAKE_CURRENT_BINARY_DIR}/cairnConfigVersion.cmake
-              cmake/CairnAddPlugin.cmake cmake/plugin_manifest.cpp.in cmake/plugin_sidecar.json.in
+              cmake/CairnAddPlugin.cmake cmake/CairnAbiTag.cmake cmake/CairnLayer.cmake cmake/CairnSubject.cmake cmake/FindImgproc.cmake
+              cmake/plugin_manifest.cpp.in cmake/plugin_sidecar.json.in
         DESTINATION ${CAIRN_PACKAGE_FOLDER} COMPONENT development)
 
 # The same for pkg-config. Its prefix is found from where the file is.

@@ -96,10 +96,13 @@ set(this_version "(= ${PROJECT_VERSION}-${CPACK_DEBIAN_PACKAGE_RELEASE})")
 set(CPACK_DEBIAN_LIBRARIES_PACKAGE_RECOMMENDS "cairn ${this_version}")
 set(libraries_control ${control_folder}/${libraries_package})
 file(WRITE ${libraries_control}/triggers "activate-noawait ldconfig\n")
-file(WRITE ${libraries_control}/shlibs "libcairn ${CAIRN_SOVERSION} ${libraries_package} ${this_version}
-libcairn_slam ${CAIRN_SOVERSION} ${libraries_package} ${this_version}
-libcairn_program ${CAIRN_SOVERSION} ${libraries_package} ${this_version}
-libcairn_c ${CAIRN_SOVERSION} ${libraries_package} ${this_version}\n")
+get_property(layers GLOBAL PROPERTY CAIRN_LAYERS)
+list(TRANSFORM layers PREPEND libcairn_)
+set(shlibs "")
+foreach(library IN ITEMS libcairn libcairn_c LISTS layers)
+  string(APPEND shlibs "${library} ${CAIRN_SOVERSION} ${libraries_package} ${this_version}\n")
+endforeach()
+file(WRITE ${libraries_control}/shlibs "${shlibs}")
 set(CPACK_DEBIAN_LIBRARIES_PACKAGE_CONTROL_EXTRA ${libraries_control}/triggers ${libraries_control}/shlibs)
 # CPack's scripts call ldconfig besides.
 file(WRITE ${libraries_control}/overrides "${libraries_package}: maintscript-calls-ldconfig *\n")

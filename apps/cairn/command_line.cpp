@@ -16,6 +16,8 @@
 #include "cairn/io/output_file.hpp"
 #include "cairn/plugin/plugin_search.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "cairn/program/command.hpp"
+#include "cairn/program/option_words.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "cairn/runtime/version.hpp"
@@ -23,8 +25,6 @@
 #include "completion.hpp"
 #include "help.hpp"
 #include "manual_page.hpp"
-#include "program/command.hpp"
-#include "program/option_words.hpp"
 
 namespace cairn::app {
 namespace {

@@ -8,9 +8,9 @@
 
 #include "cairn/plugin/plugin_search.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "cairn/program/table.hpp"
 #include "cairn/runtime/error.hpp"
 #include "option_parser.hpp"
-#include "program/table.hpp"
 
 namespace cairn::app {
 namespace {

@@ -5,8 +5,8 @@
 
 #include <fmt/core.h>
 
+#include "cairn/program/table.hpp"
 #include "option_parser.hpp"
-#include "program/table.hpp"
 
 namespace cairn::app {
 namespace {

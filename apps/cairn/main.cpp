@@ -18,13 +18,13 @@
 #include <utility>
 
 #include "cairn/io/output_file.hpp"
+#include "cairn/program/graph_files.hpp"
+#include "cairn/program/interrupt.hpp"
+#include "cairn/program/option_words.hpp"
+#include "cairn/program/session.hpp"
+#include "cairn/program/table.hpp"
 #include "cairn/runtime/error.hpp"
 #include "command_line.hpp"
-#include "program/graph_files.hpp"
-#include "program/interrupt.hpp"
-#include "program/option_words.hpp"
-#include "program/session.hpp"
-#include "program/table.hpp"
 
 namespace {
 

@@ -12,10 +12,10 @@
 
 #include <fmt/core.h>
 
+#include "cairn/program/table.hpp"
 #include "cairn/runtime/version.hpp"
 #include "help.hpp"
 #include "option_parser.hpp"
-#include "program/table.hpp"
 
 namespace cairn::app {
 namespace {

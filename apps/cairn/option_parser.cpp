@@ -21,9 +21,9 @@
 #include <CLI/Config.hpp>     // definitions that App.hpp only declares
 #include <CLI/Formatter.hpp>  // likewise
 
+#include "cairn/program/decimal_number.hpp"
+#include "cairn/program/table.hpp"
 #include "cairn/runtime/error.hpp"
-#include "program/decimal_number.hpp"
-#include "program/table.hpp"
 
 namespace cairn::app {
 namespace {

@@ -6,9 +6,9 @@
 
 #include "cairn/plugin/plugin_search.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "cairn/program/command.hpp"
+#include "cairn/program/table.hpp"
 #include "option_parser.hpp"
-#include "program/command.hpp"
-#include "program/table.hpp"
 
 namespace cairn::app {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "cairn/plugin/options.hpp"
-#include "program/session.hpp"
+#include "cairn/program/session.hpp"
 
 namespace cairn::app {
 

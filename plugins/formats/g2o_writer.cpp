@@ -4,8 +4,8 @@
 #include <string_view>
 #include <vector>
 
-#include "cairn/sparsification/correlated_pair.hpp"
-#include "cairn/sparsification/linear_constraint.hpp"
+#include "cairn/geometry/correlated_pair.hpp"
+#include "cairn/geometry/linear_constraint.hpp"
 #include "cairn/update/marginal_prior.hpp"
 #include "line_writer.hpp"
 #include "writer_order.hpp"

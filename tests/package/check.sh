@@ -68,6 +68,7 @@ while IFS= read -r file; do
   runpath=$(sed -n 's/.*(RUNPATH).*\[\(.*\)\]/\1/p' "$work/dynamic")
   [[ -z $runpath || ($runpath == "\$ORIGIN"* && $runpath != *:*) ]] || fail "$what looks for libraries in $runpath"
   if names_sources "$file"; then fail "$what names the folder of its sources"; fi
+  [[ $file != *.a ]] || continue  # is linked into what needs it
   # All of it, in the folder that has all packages.
   LD_LIBRARY_PATH='' ldd "$root/${what#*/}" >"$work/ldd" || fail "ldd $what"
   grep -q 'not found' "$work/ldd" && fail "$what: $(grep 'not found' "$work/ldd" | tr '\n' ' ')"

@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# any_folder_may_go.sh [--quick] [FOLDER...]: in a copy of the sources, deletes one plugin's folder after the other (or
-# those given), configures and builds what is left, and runs the tests that are left. With --quick it builds the program
-# and the plugins, without the tests, and only looks at what the program still offers. By hand: all folders take an hour
-# or two.
+# any_folder_may_go.sh [--quick] [FOLDER...]: in a copy of the sources, deletes the folder of one plugin or subject after the
+# other (or those given), configures and builds what is left, and runs the tests that are left. A subject (plugins/NAME) is
+# then built alone, against what is left as it is installed, and its plugins pass `cairn plugins --check`. With --quick it
+# builds the program and the plugins, without the tests, and only looks at what the program still offers. By hand: all
+# folders take hours.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 tests=ON
@@ -71,6 +72,21 @@ without() {
     { [[ $tests == OFF ]] || run_tests; }
 }
 
+# alone SUBJECT: against what was built without it, installed; and it does what it offers.
+alone() {
+  local prefix=$PWD/aside/prefix build=$PWD/aside/alone plugin
+  rm -rf "$prefix" "$build"
+  cmake --install build/release --prefix "$prefix" >/dev/null &&
+    cmake -S "$1" -B "$build" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_CXX_COMPILER_LAUNCHER=ccache \
+      -DCAIRN_PLUGIN_INSTALL_FOLDER=lib/cairn &&
+    cmake --build "$build" -j "$(nproc)" &&
+    cmake --install "$build" --prefix "$prefix" >/dev/null &&
+    "$prefix/bin/cairn" plugins || return
+  while IFS= read -r plugin; do
+    "$prefix/bin/cairn" plugins --check "$prefix/lib/cairn/${plugin##*/}" || return
+  done < <(find "$build" -name '*.so' -not -name 'lib*')
+}
+
 failed=()
 for folder in "${folders[@]}"; do
   [[ -f $folder/CMakeLists.txt ]] || {
@@ -88,6 +104,15 @@ for folder in "${folders[@]}"; do
     failed+=("$folder")
   fi
   mv aside/gone "$folder"
+  if [[ $folder == plugins/* && $tests == ON ]]; then
+    if alone "$folder" >"${log%.log}_alone.log" 2>&1; then
+      printf 'alone   %-36s against the rest, installed\n' "$folder"
+    else
+      printf 'alone   %-36s FAILED: %s\n' "$folder" "$tree/${log%.log}_alone.log"
+      tail -n 5 "${log%.log}_alone.log"
+      failed+=("$folder, alone")
+    fi
+  fi
 done
 if ((${#failed[@]})); then
   printf 'the rest does not do without: %s\n' "${failed[*]}" >&2

@@ -5,6 +5,7 @@ import subprocess
 
 # What a kind is for; a kind of a plugin that is not here has a page all the same.
 KINDS = {
+    "checks": "What `cairn plugins --check` asks of components of a kind: [plugins.md](../docs/plugins.md).",
     "edge_selection": "Which loop closures stay when a graph is sparsified: [sparsify.md](../docs/sparsify.md).",
     "estimator": "Follow a graph while it grows: [online.md](../docs/online.md).",
     "explorer": "Decide where a robot drives next: [explore.md](../docs/explore.md).",
@@ -15,14 +16,18 @@ KINDS = {
     "generator": "Make simulated data sets, the same on every machine.",
     "grid_format": "File formats of maps: [floors.md](../docs/floors.md).",
     "initial_guess": "Compute an initial estimate of a whole graph: [solvers.md](../docs/solvers.md).",
+    "line_session": "Sessions of `cairn online` in which something decides what is kept: [online.md](../docs/online.md).",
     "linear_solver": "Solve the normal equations H δ = g: [solvers.md](../docs/solvers.md).",
     "loss": "Robust losses ρ(‖r‖²): [solvers.md](../docs/solvers.md).",
     "mapper": "Build a map of scans and poses: [explore.md](../docs/explore.md).",
     "node_selection": "Which nodes leave when a graph is sparsified: [sparsify.md](../docs/sparsify.md).",
     "optimizer": "Minimise chi2: [solvers.md](../docs/solvers.md).",
+    "other_input": "What may stand for a graph and is none: [floors.md](../docs/floors.md).",
     "path_planner": "Find paths on a map: [explore.md](../docs/explore.md).",
     "pose_policy": "Decide which poses and loop closures are kept: [compact.md](../docs/compact.md).",
+    "pose_remover": "Take poses out of a map while it grows: [sparsify.md](../docs/sparsify.md).",
     "registration": "Measure the relative pose of two poses: [compact.md](../docs/compact.md), [icp.md](../docs/icp.md).",
+    "scene_source": "Recordings that are shown beside graphs: [report.md](../docs/report.md).",
     "sparsifier": "Take nodes out of a graph and keep their information: [sparsify.md](../docs/sparsify.md).",
     "topology": "Which pairs of nodes get a new factor: [sparsify.md](../docs/sparsify.md).",
     "variable": "Types of variables, by the tags of files: [formats.md](../docs/formats.md), [plugins.md](../docs/plugins.md).",

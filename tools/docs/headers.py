@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Pages of the public headers, one for each layer of the core and each subject of lib, from Doxygen's XML.
+"""Pages of the public headers, one for each layer of the core, each part of lib and each library of a subject, from Doxygen's XML.
 
 Classes are laid out by Breathe. Functions, enumerations and aliases of the namespace are shown as they are declared, each
 with its comment: by name alone Breathe could not distinguish overloads.
@@ -9,14 +9,18 @@ import xml.etree.ElementTree as ElementTree
 
 # In the order of docs/architecture.md.
 LAYERS = ["runtime", "types", "graph", "linear", "solve", "plugin"]
-SUBJECTS = ["lie", "io", "geometry", "information", "update", "online", "evaluation", "typed", "policy", "sparsification", "report", "grid", "exploration"]
+LIB = ["lie", "io", "geometry", "information", "update", "evaluation", "typed"]
+# What else has headers for C++ callers, and where.
+BESIDE = {"report": "lib/report", "online": "plugins/online/library", "sparsification": "plugins/sparsify/library",
+          "policy": "plugins/compact/library", "grid": "plugins/exploration/library/grid",
+          "exploration": "plugins/exploration/library/exploration"}
 
 
 def folders(source):
     for layer in LAYERS:
         yield "core", layer, source / "core" / "include" / "cairn" / layer
-    for subject in SUBJECTS:
-        yield "lib", subject, source / "lib" / subject / "include" / "cairn" / subject
+    for part, folder in [*((part, f"lib/{part}") for part in LIB), *BESIDE.items()]:
+        yield "lib", part, source / folder / "include" / "cairn" / part
 
 
 def simplify(xml):

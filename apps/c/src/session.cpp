@@ -15,7 +15,6 @@
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/solve/estimator.hpp"
-#include "cairn/sparsification/map_sparsifier.hpp"
 #include "calls.hpp"
 #include "objects.hpp"
 
@@ -64,12 +63,12 @@ struct cairn_session {
         name(estimator_name),
         estimator(registry->make<cairn::Estimator>(name)),
         format(registry->make<cairn::StreamFormat>(kFormat)),
-        sparsifier(*registry) {
+        remover(cairn::made_when_used({"sparsify", {}}, *registry)) {
     if (settings.marginals != "none") {
       estimator->keep_marginals(settings.marginals == "last" ? cairn::KeptMarginals::last
                                                              : cairn::KeptMarginals::diagonal);
     }
-    settings.remover = &sparsifier;
+    settings.remover = remover.get();
     const bool automatic = settings.automatic;
     lines.emplace(*estimator, *format, *registry, std::move(settings));
     if (journal_file) {
@@ -94,7 +93,7 @@ struct cairn_session {
   std::string name;
   std::unique_ptr<cairn::Estimator> estimator;
   std::unique_ptr<cairn::StreamFormat> format;
-  cairn::MapSparsifier sparsifier;
+  std::unique_ptr<cairn::PoseRemover> remover;
   std::optional<cairn::OnlineSession> lines;
   std::optional<cairn::Journal> journal;
   std::optional<cairn::Conversation> conversation;

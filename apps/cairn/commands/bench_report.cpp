@@ -6,11 +6,11 @@
 
 #include <fmt/core.h>
 
+#include "cairn/program/error_metric.hpp"
+#include "cairn/program/json_report.hpp"
+#include "cairn/program/table.hpp"
 #include "cairn/report/number_table.hpp"
 #include "cairn/runtime/threads.hpp"
-#include "program/error_metric.hpp"
-#include "program/json_report.hpp"
-#include "program/table.hpp"
 
 namespace cairn::app {
 namespace {

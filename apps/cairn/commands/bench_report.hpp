@@ -6,7 +6,7 @@
 #include <boost/json/fwd.hpp>
 
 #include "bench_run.hpp"
-#include "program/table.hpp"
+#include "cairn/program/table.hpp"
 
 namespace cairn::app {
 

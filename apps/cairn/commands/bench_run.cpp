@@ -12,14 +12,14 @@
 #include "cairn/evaluation/plausibility.hpp"
 #include "cairn/linear/iterative_solver.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "cairn/program/graph_labels.hpp"
+#include "cairn/program/interrupt.hpp"
+#include "cairn/program/option_words.hpp"
+#include "cairn/program/peak_memory.hpp"
+#include "cairn/program/progress.hpp"
+#include "cairn/program/table.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
-#include "program/graph_labels.hpp"
-#include "program/interrupt.hpp"
-#include "program/option_words.hpp"
-#include "program/peak_memory.hpp"
-#include "program/progress.hpp"
-#include "program/table.hpp"
 
 namespace cairn::app {
 namespace {

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "cairn/plugin/registry.hpp"
-#include "program/graph_files.hpp"
-#include "program/latex_table.hpp"
-#include "program/problem_setup.hpp"
+#include "cairn/program/graph_files.hpp"
+#include "cairn/program/latex_table.hpp"
+#include "cairn/program/problem_setup.hpp"
 
 namespace cairn::app {
 

@@ -5,13 +5,13 @@
 #include <fmt/core.h>
 
 #include "cairn/plugin/registry.hpp"
+#include "cairn/program/command.hpp"
+#include "cairn/program/graph_files.hpp"
+#include "cairn/program/json_report.hpp"
+#include "cairn/program/results.hpp"
+#include "cairn/program/table.hpp"
+#include "cairn/program/trajectory_axes.hpp"
 #include "cairn/runtime/error.hpp"
-#include "program/command.hpp"
-#include "program/graph_files.hpp"
-#include "program/json_report.hpp"
-#include "program/results.hpp"
-#include "program/table.hpp"
-#include "program/trajectory_axes.hpp"
 
 namespace cairn::app {
 namespace {

@@ -9,19 +9,19 @@
 
 #include <fmt/core.h>
 
+#include "cairn/evaluation/graph_divergence.hpp"
 #include "cairn/evaluation/trajectory.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "cairn/program/command.hpp"
+#include "cairn/program/covariances.hpp"
+#include "cairn/program/graph_files.hpp"
+#include "cairn/program/json_report.hpp"
+#include "cairn/program/latex_table.hpp"
+#include "cairn/program/problem_setup.hpp"
+#include "cairn/program/results.hpp"
+#include "cairn/program/table.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
-#include "cairn/sparsification/measures.hpp"
-#include "program/command.hpp"
-#include "program/covariances.hpp"
-#include "program/graph_files.hpp"
-#include "program/json_report.hpp"
-#include "program/latex_table.hpp"
-#include "program/problem_setup.hpp"
-#include "program/results.hpp"
-#include "program/table.hpp"
 
 namespace cairn::app {
 namespace {

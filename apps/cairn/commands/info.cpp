@@ -10,18 +10,18 @@
 #include "cairn/evaluation/graph_survey.hpp"
 #include "cairn/information/graph_information.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "cairn/program/command.hpp"
+#include "cairn/program/covariances.hpp"
+#include "cairn/program/error_metric.hpp"
+#include "cairn/program/graph_files.hpp"
+#include "cairn/program/json_report.hpp"
+#include "cairn/program/other_input.hpp"
+#include "cairn/program/problem_setup.hpp"
+#include "cairn/program/results.hpp"
+#include "cairn/program/table.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/timed.hpp"
-#include "program/command.hpp"
-#include "program/covariances.hpp"
-#include "program/error_metric.hpp"
-#include "program/floors.hpp"
-#include "program/graph_files.hpp"
-#include "program/json_report.hpp"
-#include "program/problem_setup.hpp"
-#include "program/results.hpp"
-#include "program/table.hpp"
 
 namespace cairn::app {
 namespace {
@@ -31,7 +31,7 @@ namespace json = boost::json;
 struct InfoOptions {
   std::string graph;
   InputOptions input;
-  FloorInfoOptions floor;
+  BodyOptions body;
   bool entropy = false;
   std::string linear_solver = kDefaultLinearSolver;  ///< of the entropy
 
@@ -48,7 +48,7 @@ struct InfoOptions {
                  "entropy of the graph at the states of the file, in nats: optimise it first")
         .component("linear_solver", &O::linear_solver, {"linear_solver"},
                    "gives the determinant for --entropy")
-        .part(&O::floor)
+        .part(&O::body)
         .part(&O::input);
   }
 };
@@ -225,10 +225,12 @@ Entropy entropy_of(const Graph& graph, const std::string& name, LinearSolver& so
 
 int run(const InfoOptions& options, Session& session) {
   session.use_threads();
-  if (names_floor(options.graph, session)) {
-    if (options.entropy)
-      throw Error(ErrorCode::usage, "--entropy is of graphs, and " + options.graph + " is a floor");
-    return run_floor_info(options.graph, options.floor, session);
+  if (const auto other = other_input(options.graph, session)) {
+    if (options.entropy) {
+      throw Error(ErrorCode::usage, fmt::format("--entropy is of graphs, and {} is {}",
+                                                options.graph, other->what()));
+    }
+    return other->info(options.graph, options.body, session);
   }
   std::optional<CovarianceSolver> solver;  // a wrong name is reported before the file is read
   if (options.entropy)

@@ -22,11 +22,11 @@
 
 #include "cairn/io/format.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "cairn/program/command.hpp"
+#include "cairn/program/json_report.hpp"
+#include "cairn/program/table.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/version.hpp"
-#include "program/command.hpp"
-#include "program/json_report.hpp"
-#include "program/table.hpp"
 
 namespace cairn::app {
 namespace {
@@ -45,7 +45,8 @@ struct Kind {
   const char* libraries;  // that it needs besides the core; "" for none
   bool example = false;   // a graph comes with it
 };
-constexpr const char* kSlam = "\n  LIBRARIES cairn::slam";  // lib: updates, motions, formats
+constexpr const char* kCompact = "\n  LIBRARIES cairn::compact";  // policies
+constexpr const char* kSlam = "\n  LIBRARIES cairn::slam";        // lib: updates, motions, formats
 constexpr std::array<Kind, 8> kKinds{
     {{"factor", "factor", "A factor of its own",
       "\"types|@NAME@|measurements of @NAME@\"\n"
@@ -71,7 +72,7 @@ constexpr std::array<Kind, 8> kKinds{
       "cairn convert @ring ring.@NAME@ --plugin build/@NAME@.so", kSlam},
      {"policy", "policy", "A pose policy of its own",
       "\"pose_policy|@NAME@|a pose every so many metres\"", "",
-      "cairn compact @ring --policy @NAME@:distance=2 --plugin build/@NAME@.so", kSlam}}};
+      "cairn compact @ring --policy @NAME@:distance=2 --plugin build/@NAME@.so", kCompact}}};
 
 constexpr const char* kExamplePrefix = "$HOME/cairn";  // to install to
 

@@ -20,11 +20,11 @@
 #include "cairn/conformance/conformance.hpp"
 #include "cairn/plugin/plugin_search.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "cairn/program/json_report.hpp"
+#include "cairn/program/table.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/timed.hpp"
 #include "isolated_work.hpp"
-#include "program/json_report.hpp"
-#include "program/table.hpp"
 #include "unlinked_symbols.hpp"
 
 namespace cairn::app {
@@ -223,7 +223,7 @@ struct Child {
       registration.findings.push_back({"the plugin can be loaded", error.what(), "", 1});
     }
     std::vector<ConformanceCase> cases;
-    if (registration.ok()) cases = conformance_cases(offers);
+    if (registration.ok()) cases = conformance_cases(offers, *registry);
     json::array names;
     for (const ConformanceCase& one : cases)
       names.push_back({{"kind", one.kind}, {"name", one.name}, {"group", one.group}});

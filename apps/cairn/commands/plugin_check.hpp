@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "program/session.hpp"
+#include "cairn/program/session.hpp"
 
 namespace cairn::app {
 

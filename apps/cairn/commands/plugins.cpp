@@ -20,15 +20,15 @@
 #include "cairn/linear/marginals.hpp"
 #include "cairn/plugin/plugin_search.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "cairn/program/command.hpp"
+#include "cairn/program/json_report.hpp"
+#include "cairn/program/table.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/solve/initial_guess.hpp"
 #include "cairn/solve/optimizer.hpp"
 #include "cairn/text/spelling.hpp"
 #include "cairn/types/loss.hpp"
 #include "plugin_check.hpp"
-#include "program/command.hpp"
-#include "program/json_report.hpp"
-#include "program/table.hpp"
 
 namespace cairn::app {
 namespace {

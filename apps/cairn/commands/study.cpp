@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // cairn study NAME: what the tables of the papers need and a robot does not. Each belongs to its
 // subject.
+#include "cairn/program/command.hpp"
 #include "cairn/runtime/error.hpp"
-#include "program/command.hpp"
 
 namespace cairn::app {
 namespace {

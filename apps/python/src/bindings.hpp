@@ -10,7 +10,7 @@ namespace cairn::python {
 
 namespace py = pybind11;
 
-// Each adds the classes and functions of one subject to the module; in this order, in which each
+// Each adds the classes and functions of one part to the module; in this order, in which each
 // uses the classes of those before it.
 void bind_errors(py::module_& module);
 void bind_values(py::module_& module);
@@ -24,13 +24,9 @@ void bind_covariances(py::module_& module);
 void bind_estimates(py::module_& module);
 void bind_estimator(py::module_& module);
 void bind_evaluation(py::module_& module);
-void bind_policy(py::module_& module);
-void bind_compact(py::module_& module);
-void bind_sparsify(py::module_& module);
-void bind_floors(py::module_& module);
-void bind_situation(py::module_& module);
-void bind_exploration(py::module_& module);
 void bind_pictures(py::module_& module);
+/// What the subjects add, each after those that it needs; written by CMake (cairn_add_python).
+void bind_subjects(py::module_& module);
 void bind_components(py::module_& module);
 
 /// After these: using an object that `__new__` has made without `__init__` is a TypeError.

@@ -19,13 +19,8 @@ PYBIND11_MODULE(_cairn, module) {
   python::bind_estimates(module);
   python::bind_estimator(module);
   python::bind_evaluation(module);
-  python::bind_policy(module);
-  python::bind_compact(module);
-  python::bind_sparsify(module);
-  python::bind_floors(module);
-  python::bind_situation(module);
-  python::bind_exploration(module);
   python::bind_pictures(module);
+  python::bind_subjects(module);
   python::bind_components(module);
   python::refuse_objects_without_init(module);
   python::take_all_protocols(module);

@@ -246,6 +246,13 @@ bool Options::given(std::string_view name) const {
   return it != values_.end() && it->second.given;
 }
 
+std::string spec_text(const ComponentSpec& spec) {
+  std::string text = spec.name;
+  for (const auto& [name, value] : spec.values)
+    text += fmt::format("{}{}={}", text.size() == spec.name.size() ? ":" : ",", name, value);
+  return text;
+}
+
 ComponentSpec parse_component(std::string_view text) {
   const auto malformed = [&](std::string_view why) {
     return Error(ErrorCode::usage,

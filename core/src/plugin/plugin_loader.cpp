@@ -115,6 +115,19 @@ std::string difference(std::string_view plugin) {
       compare_fingerprints(core_fingerprint(), plugin), remedy(core_fingerprint(), plugin));
 }
 
+/// Throws `Error` (plugin) where a library above the core has other headers than the plugin was
+/// compiled with.
+void expect_layers(const fs::path& library, const PluginManifest& manifest) {
+  for (const PluginLayer* layer = manifest.layers; layer->name; ++layer) {
+    if (std::string_view(layer->built) == layer->here) continue;
+    throw plugin_error(fmt::format(
+        "{}: built with other headers of the library libcairn_{}, so its objects cannot be "
+        "passed around (the library has {}, the plugin {})\n  build the plugin again, "
+        "with the headers of this cairn",
+        library.string(), layer->name, layer->here, layer->built));
+  }
+}
+
 /// The fingerprint in a file that cannot be loaded; empty if there is none.
 std::string fingerprint_in(const fs::path& library) {
   std::ifstream file(library, std::ios::binary);
@@ -285,6 +298,7 @@ const PluginManifest& load_plugin(const fs::path& library) {
   if (std::string_view(manifest->fingerprint) != core_fingerprint()) {
     throw plugin_error(library.string() + ": " + difference(manifest->fingerprint));
   }
+  expect_layers(library, *manifest);
   return *manifest;
 }
 

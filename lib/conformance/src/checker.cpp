@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "checker.hpp"
+#include "cairn/conformance/checker.hpp"
 
 #include <algorithm>
 #include <bit>

@@ -9,8 +9,9 @@
 
 #include <fmt/core.h>
 
+#include "cairn/conformance/checker.hpp"
 #include "cairn/runtime/error.hpp"
-#include "checker.hpp"
+#include "own_checks.hpp"
 
 namespace cairn {
 namespace {
@@ -19,7 +20,8 @@ using namespace conformance;
 
 constexpr std::string_view kOptionsGroup = "options";
 
-std::span<const Group> groups_of(std::string_view kind) {
+/// Of kinds that the core and this library know here, of others from the plugin that has them.
+std::span<const Group> groups_of(std::string_view kind, Registry& registry) {
   if (kind == "variable") return variable_groups();
   if (kind == "factor") return factor_groups();
   if (kind == "loss") return loss_groups();
@@ -29,9 +31,8 @@ std::span<const Group> groups_of(std::string_view kind) {
   if (kind == "initial_guess") return initial_guess_groups();
   if (kind == "format") return format_groups();
   if (kind == "generator") return generator_groups();
-  if (kind == "pose_policy") return pose_policy_groups();
-  if (kind == "sparsifier") return sparsifier_groups();
-  return {};
+  if (!registry.has(KindChecks::kKind, kind)) return {};
+  return registry.make<KindChecks>(kind)->groups();
 }
 
 /// A type has no options of its own: those are of its set (kind "types").
@@ -82,10 +83,10 @@ void run_with_choices(const ConformanceCase& which, const Group& group, Registry
 
 ConformanceObserver::~ConformanceObserver() = default;
 
-std::vector<ConformanceCase> conformance_cases(std::span<const Offer> offers) {
+std::vector<ConformanceCase> conformance_cases(std::span<const Offer> offers, Registry& registry) {
   std::vector<ConformanceCase> cases;
   for (const Offer& offer : offers) {
-    for (const Group& group : groups_of(offer.kind))
+    for (const Group& group : groups_of(offer.kind, registry))
       cases.push_back({offer.kind, offer.name, std::string(group.name)});
     if (has_options(offer.kind))
       cases.push_back({offer.kind, offer.name, std::string(kOptionsGroup)});
@@ -99,7 +100,7 @@ ConformanceResult check_conformance(const ConformanceCase& which, Registry& regi
   ConformanceResult result{which, 0, {}, {}};
   Checker check(result, options, observer);
   const Subject subject{registry, which.name};
-  const std::span<const Group> groups = groups_of(which.kind);
+  const std::span<const Group> groups = groups_of(which.kind, registry);
   const auto group = std::ranges::find(groups, which.group, &Group::name);
   const bool of_options = which.group == kOptionsGroup && has_options(which.kind);
   if (group == groups.end() && !of_options) {
@@ -144,7 +145,7 @@ std::vector<ConformanceResult> check_conformance(std::string_view plugin, Regist
                                                others.empty() ? "none" : others));
   }
   std::vector<ConformanceResult> results;
-  for (const ConformanceCase& one : conformance_cases(own))
+  for (const ConformanceCase& one : conformance_cases(own, registry))
     results.push_back(check_conformance(one, registry, options));
   return results;
 }

@@ -13,14 +13,15 @@
 #include <utility>
 #include <vector>
 
+#include "cairn/conformance/checker.hpp"
+#include "cairn/conformance/repetition.hpp"
+#include "cairn/conformance/sample_graph.hpp"
+#include "cairn/conformance/samples.hpp"
 #include "cairn/graph/graph.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/solve/estimator.hpp"
-#include "checker.hpp"
 #include "failure_checks.hpp"
-#include "repetition.hpp"
-#include "sample_graph.hpp"
-#include "samples.hpp"
+#include "own_checks.hpp"
 
 namespace cairn::conformance {
 namespace {

@@ -10,10 +10,10 @@
 
 #include <Eigen/Core>
 
+#include "cairn/conformance/repetition.hpp"
 #include "cairn/evaluation/check_factor.hpp"
 #include "factor_pool_checks.hpp"
 #include "factor_samples.hpp"
-#include "repetition.hpp"
 #include "wrapping_checks.hpp"
 
 namespace cairn::conformance {

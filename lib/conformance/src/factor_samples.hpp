@@ -11,7 +11,7 @@
 
 #include <Eigen/Core>
 
-#include "samples.hpp"
+#include "cairn/conformance/samples.hpp"
 
 namespace cairn::conformance {
 

@@ -11,12 +11,12 @@
 #include <utility>
 #include <vector>
 
+#include "cairn/conformance/repetition.hpp"
+#include "cairn/conformance/sample_graph.hpp"
+#include "cairn/conformance/samples.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/solve/estimator.hpp"
 #include "cairn/types/wrapped_factor.hpp"
-#include "repetition.hpp"
-#include "sample_graph.hpp"
-#include "samples.hpp"
 
 namespace cairn::conformance {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "checker.hpp"
+#include "cairn/conformance/checker.hpp"
 
 namespace cairn::conformance {
 

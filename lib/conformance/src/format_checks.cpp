@@ -10,14 +10,15 @@
 #include <utility>
 #include <vector>
 
+#include "cairn/conformance/checker.hpp"
+#include "cairn/conformance/repetition.hpp"
+#include "cairn/conformance/sample_graph.hpp"
+#include "cairn/conformance/samples.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/io/generator.hpp"
 #include "cairn/io/random_numbers.hpp"
 #include "cairn/runtime/error.hpp"
-#include "checker.hpp"
-#include "repetition.hpp"
-#include "sample_graph.hpp"
-#include "samples.hpp"
+#include "own_checks.hpp"
 
 namespace cairn::conformance {
 namespace {

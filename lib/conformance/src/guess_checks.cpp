@@ -6,12 +6,13 @@
 #include <string>
 #include <vector>
 
+#include "cairn/conformance/checker.hpp"
+#include "cairn/conformance/repetition.hpp"
+#include "cairn/conformance/sample_graph.hpp"
+#include "cairn/conformance/samples.hpp"
 #include "cairn/graph/graph.hpp"
 #include "cairn/solve/initial_guess.hpp"
-#include "checker.hpp"
-#include "repetition.hpp"
-#include "sample_graph.hpp"
-#include "samples.hpp"
+#include "own_checks.hpp"
 
 namespace cairn::conformance {
 namespace {

@@ -10,18 +10,19 @@
 
 #include <Eigen/Core>
 
+#include "cairn/conformance/checker.hpp"
+#include "cairn/conformance/repetition.hpp"
+#include "cairn/conformance/samples.hpp"
 #include "cairn/io/random_numbers.hpp"
 #include "cairn/linear/iterative_solver.hpp"
 #include "cairn/linear/jacobian.hpp"
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/linear/marginals.hpp"
 #include "cairn/runtime/error.hpp"
-#include "checker.hpp"
 #include "dense/cholesky.hpp"
 #include "dense/eigenvalues.hpp"
 #include "dense/products.hpp"
-#include "repetition.hpp"
-#include "samples.hpp"
+#include "own_checks.hpp"
 
 namespace cairn::conformance {
 namespace {

@@ -5,10 +5,11 @@
 #include <memory>
 #include <vector>
 
+#include "cairn/conformance/checker.hpp"
+#include "cairn/conformance/repetition.hpp"
+#include "cairn/conformance/samples.hpp"
 #include "cairn/types/loss.hpp"
-#include "checker.hpp"
-#include "repetition.hpp"
-#include "samples.hpp"
+#include "own_checks.hpp"
 
 namespace cairn::conformance {
 namespace {

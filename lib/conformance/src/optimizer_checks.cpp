@@ -13,16 +13,17 @@
 #include <utility>
 #include <vector>
 
+#include "cairn/conformance/checker.hpp"
+#include "cairn/conformance/repetition.hpp"
+#include "cairn/conformance/sample_graph.hpp"
+#include "cairn/conformance/samples.hpp"
 #include "cairn/graph/graph.hpp"
 #include "cairn/lie/point.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/solve/optimizer.hpp"
 #include "cairn/types/define_factor.hpp"
 #include "cairn/types/define_variable.hpp"
-#include "checker.hpp"
-#include "repetition.hpp"
-#include "sample_graph.hpp"
-#include "samples.hpp"
+#include "own_checks.hpp"
 
 namespace cairn::conformance {
 namespace {

@@ -11,60 +11,14 @@
 #include <string_view>
 #include <utility>
 
-#include "cairn/exploration/explorer.hpp"
-#include "cairn/exploration/floor_map.hpp"
-#include "cairn/exploration/path_planner.hpp"
-#include "cairn/exploration/scan_log.hpp"
-#include "cairn/exploration/world.hpp"
-#include "cairn/grid/floor_plan.hpp"
-#include "cairn/grid/floor_survey.hpp"
-#include "cairn/grid/grid_format.hpp"
-#include "cairn/io/format.hpp"
-#include "cairn/io/generator.hpp"
-#include "cairn/io/stream_format.hpp"
-#include "cairn/linear/linear_solver.hpp"
+#include "cairn/conformance/checker.hpp"
 #include "cairn/plugin/options.hpp"
-#include "cairn/policy/pose_policy.hpp"
-#include "cairn/policy/registration.hpp"
-#include "cairn/report/scene.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/timed.hpp"
-#include "cairn/solve/estimator.hpp"
-#include "cairn/solve/initial_guess.hpp"
-#include "cairn/solve/optimizer.hpp"
-#include "cairn/sparsification/edge_selection.hpp"
-#include "cairn/sparsification/recovery.hpp"
-#include "cairn/sparsification/selection.hpp"
-#include "cairn/sparsification/sparsifier.hpp"
-#include "cairn/sparsification/topology.hpp"
-#include "cairn/types/loss.hpp"
-#include "checker.hpp"
+#include "own_checks.hpp"
 
 namespace cairn::conformance {
 namespace {
-
-using Make = std::unique_ptr<Component> (*)(Registry&, const ComponentSpec&);
-struct Maker {
-  std::string_view kind;
-  Make make;
-};
-
-template <class Interface>
-constexpr Maker maker() {
-  return {Interface::kKind,
-          [](Registry& registry, const ComponentSpec& spec) -> std::unique_ptr<Component> {
-            return registry.make<Interface>(spec);
-          }};
-}
-
-/// Of every kind that cairn has an interface for.
-constexpr auto kMakers = std::to_array<Maker>(
-    {maker<EdgeSelection>(), maker<Estimator>(),     maker<Explorer>(),     maker<FactorRecovery>(),
-     maker<FloorPlan>(),     maker<FloorSurveyor>(), maker<Format>(),       maker<Generator>(),
-     maker<GridFormat>(),    maker<InitialGuess>(),  maker<LinearSolver>(), maker<Loss>(),
-     maker<Mapper>(),        maker<NodeSelection>(), maker<Optimizer>(),    maker<PathPlanner>(),
-     maker<Picture>(),       maker<PosePolicy>(),    maker<Registration>(), maker<ScanLogFormat>(),
-     maker<Sparsifier>(),    maker<StreamFormat>(),  maker<Topology>(),     maker<World>()});
 
 bool plain_name(std::string_view name) {
   return !name.empty() && std::ranges::all_of(name, [](char c) {
@@ -132,14 +86,14 @@ void check_spec(const OptionSpec& spec, const OptionTable& table, const Subject&
 constexpr double kMakingSeconds = 0.5;
 
 /// The least of several times, so that a busy machine is no finding; one quick time is enough.
-void check_time(const Maker& maker, const Subject& subject, Checker& check) {
+void check_time(std::string_view kind, const Subject& subject, Checker& check) {
   check.sample("no options", [&] {
     double least = std::numeric_limits<double>::infinity();
     check.call("the factory", [&] {
       for (int k = 0; k < 3 && least > kMakingSeconds; ++k) {
         const auto begin = std::chrono::steady_clock::now();
         try {
-          static_cast<void>(maker.make(subject.registry, {subject.name, {}}));
+          static_cast<void>(subject.registry.make_any(kind, {subject.name, {}}));
         } catch (const Error&) {  // a finding of its own
         }
         least = std::min(least, seconds_since(begin));
@@ -159,13 +113,11 @@ void check_options(const Subject& subject, std::string_view kind, Checker& check
     check.sample("", [&] { check_spec(spec, table, subject, check); });
   }
   if (kind == "types") return;
-  const auto known =
-      std::ranges::find_if(kMakers, [&](const Maker& one) { return one.kind == kind; });
-  if (known == kMakers.end()) return check.note("a kind of its own: it is not made here");
   const auto make = [&](const OptionValues& values, std::string_view law) {
     check.expect(true, law, [] { return std::string(); });
     try {
-      std::unique_ptr<Component> component = known->make(subject.registry, {subject.name, values});
+      std::unique_ptr<Component> component =
+          subject.registry.make_any(kind, {subject.name, values});
       check.announce("the destructor");
       component.reset();
     } catch (const Error& error) {
@@ -176,7 +128,7 @@ void check_options(const Subject& subject, std::string_view kind, Checker& check
   check.sample("no options", [&] {
     check.call("the factory", [&] { make({}, "it can be made with its defaults"); });
   });
-  check_time(*known, subject, check);
+  check_time(kind, subject, check);
   for (const OptionSpec& spec : table.specs()) {
     std::vector<std::string> values{spec.default_value};
     if (spec.type == OptionType::choice) values = spec.choices;

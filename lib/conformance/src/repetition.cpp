@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "repetition.hpp"
+#include "cairn/conformance/repetition.hpp"
 
 #include <algorithm>
 #include <barrier>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "sample_graph.hpp"
+#include "cairn/conformance/sample_graph.hpp"
 
 #include <algorithm>
 #include <array>
@@ -12,6 +12,7 @@
 
 #include <fmt/core.h>
 
+#include "cairn/conformance/samples.hpp"
 #include "cairn/graph/gauge.hpp"
 #include "cairn/io/random_numbers.hpp"
 #include "cairn/lie/se2.hpp"
@@ -143,6 +144,19 @@ std::vector<double> states_of(const Graph& graph) {
 
 bool all_finite(const Graph& graph) {
   return std::ranges::all_of(states_of(graph), [](double x) { return std::isfinite(x); });
+}
+
+double largest_distance(const Graph& some, const Graph& all) {
+  double largest = 0.0;
+  for (int v = 0; v < some.variable_count(); ++v) {
+    const std::optional<int> other = all.find(some.id(v));
+    if (!other) continue;
+    State delta(3);
+    some.type(v).local(1, some.state(v).data(), all.state(*other).data(), delta.data());
+    const double distance = norm(delta);
+    if (!(distance <= largest)) largest = distance;
+  }
+  return largest;
 }
 
 double minimize_densely(Graph& graph) {

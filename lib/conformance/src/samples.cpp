@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "samples.hpp"
+#include "cairn/conformance/samples.hpp"
 
 #include <cmath>
 #include <cstdint>

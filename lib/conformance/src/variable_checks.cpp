@@ -9,8 +9,8 @@
 
 #include <Eigen/Core>
 
-#include "repetition.hpp"
-#include "samples.hpp"
+#include "cairn/conformance/repetition.hpp"
+#include "cairn/conformance/samples.hpp"
 
 namespace cairn::conformance {
 namespace {

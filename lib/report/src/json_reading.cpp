@@ -8,7 +8,7 @@
 #include <boost/json/parse.hpp>
 #include <boost/json/serialize.hpp>
 
-#include "cairn/report/packed_array.hpp"
+#include "cairn/io/packed_array.hpp"
 #include "cairn/runtime/error.hpp"
 
 namespace cairn {

@@ -8,7 +8,7 @@
 #include <fmt/core.h>
 
 #include "cairn/io/output_file.hpp"
-#include "cairn/report/packed_array.hpp"
+#include "cairn/io/packed_array.hpp"
 #include "cairn/report/scene_json.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/version.hpp"

@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "cairn/report/packed_array.hpp"
+#include "cairn/io/packed_array.hpp"
 #include "cairn/runtime/error.hpp"
 #include "json_reading.hpp"
 

@@ -10,16 +10,16 @@
 
 #include <fmt/core.h>
 
+#include "cairn/program/graph_files.hpp"
+#include "cairn/program/interrupt.hpp"
+#include "cairn/program/latex_table.hpp"
+#include "cairn/program/progress.hpp"
+#include "cairn/program/results.hpp"
+#include "cairn/program/table.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "cairn/runtime/timed.hpp"
 #include "explore_comparison_report.hpp"
-#include "program/graph_files.hpp"
-#include "program/interrupt.hpp"
-#include "program/latex_table.hpp"
-#include "program/progress.hpp"
-#include "program/results.hpp"
-#include "program/table.hpp"
 
 namespace cairn::app {
 namespace {

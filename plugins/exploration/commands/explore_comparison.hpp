@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "cairn/exploration/explorer_comparison.hpp"
+#include "cairn/program/session.hpp"
 #include "explore_report.hpp"
-#include "program/session.hpp"
 
 namespace cairn::app {
 

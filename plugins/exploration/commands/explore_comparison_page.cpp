@@ -7,11 +7,11 @@
 #include <fmt/format.h>
 
 #include "cairn/plugin/registry.hpp"
+#include "cairn/program/album.hpp"
+#include "cairn/program/picture_files.hpp"
+#include "cairn/program/table.hpp"
 #include "cairn/report/scene.hpp"
 #include "explore_comparison_report.hpp"
-#include "program/album.hpp"
-#include "program/picture_files.hpp"
-#include "program/table.hpp"
 
 namespace cairn::app {
 namespace {

@@ -12,9 +12,9 @@
 
 #include <fmt/format.h>
 
-#include "program/floors.hpp"
-#include "program/json_report.hpp"
-#include "program/table.hpp"
+#include "cairn/program/json_report.hpp"
+#include "cairn/program/table.hpp"
+#include "floors.hpp"
 
 namespace cairn::app {
 namespace {

@@ -7,9 +7,9 @@
 #include <boost/json/object.hpp>
 
 #include "cairn/exploration/explorer_comparison.hpp"
+#include "cairn/program/session.hpp"
 #include "cairn/report/number_table.hpp"
 #include "explore_report.hpp"
-#include "program/session.hpp"
 
 namespace cairn::app {
 

@@ -11,12 +11,12 @@
 #include <fmt/core.h>
 
 #include "cairn/exploration/recording.hpp"
+#include "cairn/io/packed_array.hpp"
 #include "cairn/plugin/registry.hpp"
-#include "cairn/report/packed_array.hpp"
+#include "cairn/program/album.hpp"
+#include "cairn/program/graph_files.hpp"
+#include "cairn/program/picture_files.hpp"
 #include "cairn/runtime/error.hpp"
-#include "program/album.hpp"
-#include "program/graph_files.hpp"
-#include "program/picture_files.hpp"
 
 namespace cairn::app {
 

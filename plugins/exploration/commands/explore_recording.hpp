@@ -8,9 +8,9 @@
 
 #include "cairn/exploration/exploration.hpp"
 #include "cairn/exploration/recorder.hpp"
-#include "cairn/exploration/run_server.hpp"
-#include "program/results.hpp"
-#include "program/session.hpp"
+#include "cairn/online/run_server.hpp"
+#include "cairn/program/results.hpp"
+#include "cairn/program/session.hpp"
 
 namespace cairn::app {
 

@@ -9,9 +9,9 @@
 #include <fmt/format.h>
 
 #include "cairn/evaluation/trajectory.hpp"
-#include "program/floors.hpp"
-#include "program/json_report.hpp"
-#include "program/table.hpp"
+#include "cairn/program/json_report.hpp"
+#include "cairn/program/table.hpp"
+#include "floors.hpp"
 
 namespace cairn::app {
 namespace {

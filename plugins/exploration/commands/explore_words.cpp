@@ -11,8 +11,8 @@
 
 #include "cairn/exploration/world.hpp"
 #include "cairn/plugin/options.hpp"
+#include "cairn/program/decimal_number.hpp"
 #include "cairn/runtime/error.hpp"
-#include "program/decimal_number.hpp"
 
 namespace cairn::app {
 namespace {

@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 
 #include "cairn/grid/cell_traversal.hpp"
-#include "program/table.hpp"
+#include "cairn/program/table.hpp"
 
 namespace cairn::app {
 namespace {

@@ -9,7 +9,7 @@
 #include <Eigen/Core>
 
 #include "cairn/exploration/floor_map.hpp"
-#include "program/session.hpp"
+#include "cairn/program/session.hpp"
 
 namespace cairn::app {
 

@@ -4,6 +4,7 @@
 namespace cairn::app {
 // One file each.
 void add_explore(Registrar& registrar);
+void add_floor_input(Registrar& registrar);
 void add_map(Registrar& registrar);
 void add_study_objective(Registrar& registrar);
 void add_study_optimality(Registrar& registrar);
@@ -12,6 +13,7 @@ void add_study_optimality(Registrar& registrar);
 void cairn_register(cairn::Registrar& registrar) {
   using namespace cairn::app;
   add_explore(registrar);
+  add_floor_input(registrar);
   add_map(registrar);
   add_study_objective(registrar);
   add_study_optimality(registrar);

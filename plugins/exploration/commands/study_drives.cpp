@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "study_drives.hpp"
 
-#include "program/command.hpp"
-#include "program/floors.hpp"
+#include "cairn/program/command.hpp"
+#include "floors.hpp"
 
 namespace cairn::app {
 

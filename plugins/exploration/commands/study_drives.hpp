@@ -9,9 +9,9 @@
 #include "cairn/exploration/exploration.hpp"
 #include "cairn/plugin/options.hpp"
 #include "cairn/plugin/registry.hpp"
-#include "program/interrupt.hpp"
-#include "program/progress.hpp"
-#include "program/session.hpp"
+#include "cairn/program/interrupt.hpp"
+#include "cairn/program/progress.hpp"
+#include "cairn/program/session.hpp"
 #include "slam_names.hpp"
 
 namespace cairn::app {

@@ -6,13 +6,13 @@
 #include <fmt/core.h>
 
 #include "cairn/plugin/registry.hpp"
+#include "cairn/program/command.hpp"
+#include "cairn/program/graph_files.hpp"
+#include "cairn/program/json_report.hpp"
+#include "cairn/program/other_input.hpp"
+#include "cairn/program/results.hpp"
+#include "cairn/program/table.hpp"
 #include "cairn/runtime/error.hpp"
-#include "program/command.hpp"
-#include "program/floors.hpp"
-#include "program/graph_files.hpp"
-#include "program/json_report.hpp"
-#include "program/results.hpp"
-#include "program/table.hpp"
 
 namespace cairn::app {
 namespace {
@@ -57,11 +57,14 @@ boost::json::object report_json(const GenerateOptions& options, const Simulation
 }
 
 int run(const GenerateOptions& options, Session& session) {
-  if (names_floor_plan(options.kind, session)) {
-    if (!options.ground_truth.empty() || !options.output_format.empty())
-      throw Error(ErrorCode::usage, "--ground-truth and --to are of graphs: '" + options.kind +
-                                        "' is a floor, whose format is that of its ending");
-    return run_floor_generate(options.kind, options.seed, options.output, session);
+  if (const auto other = other_input("@" + options.kind, session)) {
+    if (!options.ground_truth.empty() || !options.output_format.empty()) {
+      throw Error(ErrorCode::usage,
+                  fmt::format("--ground-truth and --to are of graphs: '{}' is {}, whose format is "
+                              "that of its ending",
+                              options.kind, other->what()));
+    }
+    return other->generate(options.kind, options.seed, options.output, session);
   }
   check_output(options.output, options.output_format, session);
   check_output(options.ground_truth, options.output_format, session);

@@ -12,13 +12,13 @@
 
 #include "cairn/io/format.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "cairn/program/album.hpp"
+#include "cairn/program/command.hpp"
+#include "cairn/program/json_report.hpp"
+#include "cairn/program/picture_files.hpp"
+#include "cairn/program/results.hpp"
+#include "cairn/program/table.hpp"
 #include "cairn/runtime/error.hpp"
-#include "program/album.hpp"
-#include "program/command.hpp"
-#include "program/json_report.hpp"
-#include "program/picture_files.hpp"
-#include "program/results.hpp"
-#include "program/table.hpp"
 
 namespace cairn::app {
 namespace {
@@ -121,14 +121,17 @@ std::string output_of(const PlotOptions& options, Session& session) {
   return file;
 }
 
-void check_columns(const PlotOptions& options) {
+void check_columns(const PlotOptions& options, Session& session) {
   if (options.decision && options.what != "map")
     throw Error(ErrorCode::usage, "--decision is for --what map");
   if (options.what == "map" &&
       (!options.x.empty() || !options.y.empty() || options.x_max || options.logarithmic != "none"))
     throw Error(ErrorCode::usage,
                 "--x, --y, --x-max and --log are for columns, not for --what map");
-  if (std::ranges::any_of(options.album.files, has_columns)) return;
+  const auto columns = [&](const std::string& file) {
+    return has_columns(file, session.registry());
+  };
+  if (std::ranges::any_of(options.album.files, columns)) return;
   if (!options.y.empty() || options.x_max || options.logarithmic != "none")
     throw Error(ErrorCode::usage,
                 "--y, --x-max and --log are for columns of CSV files (.csv) and of recordings of "
@@ -138,7 +141,7 @@ void check_columns(const PlotOptions& options) {
 ComponentSpec picture_spec(const PlotOptions& options, const std::string& output,
                            Session& session) {
   check_picture(output, session);
-  check_columns(options);
+  check_columns(options, session);
   ComponentSpec picture{picture_format(output, session), {}};
   if (picture.name == "html") return picture;
   if (options.album.apart && options.album.files.size() > 1 && !options.album.title.empty())

@@ -7,13 +7,13 @@
 
 #include "cairn/io/format.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "cairn/program/album.hpp"
+#include "cairn/program/command.hpp"
+#include "cairn/program/json_report.hpp"
+#include "cairn/program/picture_files.hpp"
+#include "cairn/program/results.hpp"
+#include "cairn/program/table.hpp"
 #include "cairn/runtime/error.hpp"
-#include "program/album.hpp"
-#include "program/command.hpp"
-#include "program/json_report.hpp"
-#include "program/picture_files.hpp"
-#include "program/results.hpp"
-#include "program/table.hpp"
 
 namespace cairn::app {
 namespace {

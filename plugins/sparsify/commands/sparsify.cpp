@@ -13,21 +13,20 @@
 #include <fmt/core.h>
 
 #include "cairn/plugin/registry.hpp"
-#include "cairn/policy/policy_run.hpp"
+#include "cairn/program/command.hpp"
+#include "cairn/program/error_metric.hpp"
+#include "cairn/program/graph_files.hpp"
+#include "cairn/program/interrupt.hpp"
+#include "cairn/program/json_report.hpp"
+#include "cairn/program/problem_setup.hpp"
+#include "cairn/program/progress.hpp"
+#include "cairn/program/results.hpp"
+#include "cairn/program/step_times.hpp"
+#include "cairn/program/table.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "cairn/sparsification/sparsify_graph.hpp"
 #include "information_frame.hpp"
-#include "program/command.hpp"
-#include "program/error_metric.hpp"
-#include "program/graph_files.hpp"
-#include "program/interrupt.hpp"
-#include "program/json_report.hpp"
-#include "program/problem_setup.hpp"
-#include "program/progress.hpp"
-#include "program/results.hpp"
-#include "program/step_times.hpp"
-#include "program/table.hpp"
 #include "recording_redirection.hpp"
 #include "sparsify.hpp"
 #include "sparsify_edges.hpp"
@@ -236,7 +235,7 @@ SparsifyResult sparsify(const Graph& graph, const SparsifyJob& job, const Proble
                         Stop stop, const InterruptGuard& guard, SparsificationObserver observer,
                         Session& session) {
   stop.interrupt = &guard.flag();
-  NodeProgress nodes(session.common.quiet);
+  WorkProgress nodes(session.common.quiet);
   GuessProgress guess(session.common.quiet, guard.flag());
   OptimizationProgress iterations(session.common.quiet, stop.max_iterations);
   const SparsifySetting setting{
@@ -247,7 +246,10 @@ SparsifyResult sparsify(const Graph& graph, const SparsifyJob& job, const Proble
       .initialise = [&](Graph& whole) { return setup.apply(whole, std::ref(guess)); },
       .observer = std::move(observer),
       .optimisation = &iterations,
-      .progress = [&](const SparsifyProgress& progress) { nodes.show(progress); }};
+      .progress =
+          [&](const SparsifyProgress& progress) {
+            nodes.show(progress.part(), progress.to_string());
+          }};
   return job.online > 0 ? sparsify_online(graph, job, setting)
                         : sparsify_whole(graph, job, setting);
 }

@@ -3,10 +3,10 @@
 
 #include <string>
 
+#include "cairn/program/graph_files.hpp"
+#include "cairn/program/problem_setup.hpp"
+#include "cairn/program/session.hpp"
 #include "cairn/sparsification/redirection.hpp"
-#include "program/graph_files.hpp"
-#include "program/problem_setup.hpp"
-#include "program/session.hpp"
 
 namespace cairn::app {
 

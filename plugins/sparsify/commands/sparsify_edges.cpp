@@ -12,19 +12,19 @@
 #include <boost/json/object.hpp>
 
 #include "cairn/plugin/registry.hpp"
+#include "cairn/program/command.hpp"
+#include "cairn/program/error_metric.hpp"
+#include "cairn/program/graph_files.hpp"
+#include "cairn/program/interrupt.hpp"
+#include "cairn/program/json_report.hpp"
+#include "cairn/program/problem_setup.hpp"
+#include "cairn/program/progress.hpp"
+#include "cairn/program/results.hpp"
+#include "cairn/program/table.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "cairn/sparsification/sparsify_edges.hpp"
 #include "information_frame.hpp"
-#include "program/command.hpp"
-#include "program/error_metric.hpp"
-#include "program/graph_files.hpp"
-#include "program/interrupt.hpp"
-#include "program/json_report.hpp"
-#include "program/problem_setup.hpp"
-#include "program/progress.hpp"
-#include "program/results.hpp"
-#include "program/table.hpp"
 
 namespace cairn::app {
 namespace {
@@ -160,24 +160,7 @@ std::string summary_text(const SparsifyCommandOptions& options, const LoadedGrap
   return table.text(false);
 }
 
-/// Shows how far the selection is.
-class EdgeProgress {
- public:
-  explicit EdgeProgress(bool quiet) : line_(quiet) {}
-  void show(const SparsifyProgress& progress) {
-    const auto now = std::chrono::steady_clock::now();
-    if (now - shown_ < std::chrono::milliseconds(line_.on_terminal() ? 100 : 5000)) return;
-    shown_ = now;
-    line_.show(fmt::format(
-        "{} choosing loop closures, {} of {}",
-        bar(static_cast<double>(progress.done) / static_cast<double>(progress.total), 30),
-        progress.done, progress.total));
-  }
-
- private:
-  StatusLine line_;
-  std::chrono::steady_clock::time_point shown_{};
-};
+;
 
 }  // namespace
 
@@ -190,7 +173,7 @@ int run_sparsify_edges(const SparsifyCommandOptions& options, Session& session) 
   LoadedGraph loaded = load_graph(options.graph, options.input, session);
   if (options.information_frame == "first") information_of_first_frame(loaded.graph);
   const InterruptGuard guard;
-  EdgeProgress edges(session.common.quiet);
+  WorkProgress edges(session.common.quiet, /*at_once=*/true);
   GuessProgress guess(session.common.quiet, guard.flag());
   Stop stop = options.problem.stop;
   stop.interrupt = &guard.flag();
@@ -202,7 +185,10 @@ int run_sparsify_edges(const SparsifyCommandOptions& options, Session& session) 
       .loss_on = setup.loss_selector(),
       .initialise = [&](Graph& whole) { return setup.apply(whole, std::ref(guess)); },
       .optimisation = &iterations,
-      .progress = [&](const SparsifyProgress& progress) { edges.show(progress); }};
+      .progress =
+          [&](const SparsifyProgress& progress) {
+            edges.show(progress.part(), progress.to_string());
+          }};
   const SparsifyEdgesResult result = sparsify_edges(loaded.graph, job, setting);
   for (const std::string& note : result.whole.notes) session.note(note);
   Results results(session);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "program/session.hpp"
+#include "cairn/program/session.hpp"
 #include "sparsify.hpp"
 
 namespace cairn::app {

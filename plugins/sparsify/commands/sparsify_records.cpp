@@ -20,9 +20,9 @@
 #include "cairn/graph/packed.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "cairn/program/json_text.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/timed.hpp"
-#include "program/json_text.hpp"
 
 namespace cairn::app {
 namespace {

@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "cairn/exploration/recording.hpp"
-#include "cairn/report/packed_array.hpp"
+#include "cairn/io/packed_array.hpp"
 #include "cairn/report/recording.hpp"
 #include "cairn/report/run_report.hpp"
 #include "cairn/report/scene_json.hpp"

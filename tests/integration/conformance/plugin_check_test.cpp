@@ -267,6 +267,7 @@ TEST(WrongFormat, IsNamed) {
 }
 
 TEST(WrongPolicy, IsNamed) {
+  if (!std::filesystem::exists(wrong("wrong_policies"))) GTEST_SKIP() << "built without policies";
   const Checked checked = check(wrong("wrong_policies"), {"--seconds", "20"});
   EXPECT_THAT(checked.laws_of("never_satisfied"), Contains("next_match comes to an end"));
   EXPECT_THAT(checked.laws_of("boasts"), ElementsAre("kept is what the reports say that is kept"));

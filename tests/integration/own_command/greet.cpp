@@ -3,9 +3,9 @@
 #include <string>
 #include <vector>
 
-#include "program/command.hpp"
-#include "program/session.hpp"
-#include "program/table.hpp"
+#include "cairn/program/command.hpp"
+#include "cairn/program/session.hpp"
+#include "cairn/program/table.hpp"
 
 namespace {
 

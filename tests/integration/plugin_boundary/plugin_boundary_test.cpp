@@ -139,6 +139,17 @@ TEST_F(PluginBoundary, AWrongFingerprintIsRefusedWithBothFingerprints) {
   EXPECT_THAT(message, HasSubstr("\n  build the plugin again, with the headers of this cairn"));
 }
 
+TEST_F(PluginBoundary, APluginIsBoundToTheLibrariesThatItIsLinkedWith) {
+  cairn::Registry today(search_in({kBad / "same_layer"}));
+  EXPECT_NE(today.make<cairn::Loss>("plain"), nullptr);
+  cairn::Registry another(search_in({kBad / "other_layer"}));
+  EXPECT_THAT(message_of(another, "plain"),
+              AllOf(StartsWith(so("other_layer", "of_another_day") +
+                               ": built with other headers of the library libcairn_slam"),
+                    HasSubstr("the plugin 0123456789abcdef"),
+                    HasSubstr("build the plugin again, with the headers of this cairn")));
+}
+
 TEST_F(PluginBoundary, AStandardLibraryWithChecksIsRefusedWithBothFingerprints) {
   cairn::Registry registry(search_in({kBad / "debug_library"}));
   const std::string message = message_of(registry, "plain");

@@ -45,7 +45,8 @@
 /// Everything that must agree between core and plugin for their objects to be passed around: as one
 /// string, `;`-separated, fixed when the plugin is compiled. (Values of macros, so that core and
 /// plugin are compared as they were really compiled.) Of the compiler its name and major version
-/// count; CAIRN_ABI_TAG is a hash of all public headers (cmake/CairnAbiTag.cmake).
+/// count; CAIRN_ABI_TAG is a hash of the core's public headers
+/// (cmake/CairnAbiTag.cmake); libraries above the core are compared by `PluginManifest::layers`.
 #define CAIRN_ABI_FINGERPRINT \
   "cairn " CAIRN_VERSION "; headers " CAIRN_ABI_TAG "; " CAIRN_COMPILER_ "; " CAIRN_STDLIB_        \
   " debug=" CAIRN_STDLIB_DEBUG_ " assertions=" CAIRN_STDLIB_ASSERTIONS_                            \

@@ -140,6 +140,9 @@ CAIRN_API ComponentSpec parse_component(std::string_view text);
 /// `ComponentSpec` can.
 CAIRN_API std::string to_text(const ComponentSpec& spec);
 
+/// "compact_pose:range=5,angle=0.5", for people: also of what `to_text` refuses.
+CAIRN_API std::string spec_text(const ComponentSpec& spec);
+
 /// Splits `a,b:key=value,key=value,c` into its components: a part that holds '=' but no ':' before
 /// it belongs to the component on its left.
 CAIRN_API std::vector<std::string> split_components(std::string_view text);

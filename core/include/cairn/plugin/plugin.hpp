@@ -14,6 +14,13 @@ struct PluginOffer {
   const char* summary;  ///< one line
 };
 
+/// A library of cairn that a plugin was compiled with, beside the core.
+struct PluginLayer {
+  const char* name;   ///< "slam", "compact", …; null ends the list
+  const char* built;  ///< the hash of that library's headers when the plugin was compiled
+  const char* here;   ///< that of the library which the plugin has in this process
+};
+
 /// What a plugin hands over from its one C entry point, `cairn_plugin_v1`. Plain data: it is read
 /// before anything else of the plugin is trusted.
 struct PluginManifest {
@@ -26,6 +33,7 @@ struct PluginManifest {
   const char* fingerprint;  ///< of the code of the plugin: see CAIRN_ABI_FINGERPRINT
   void (*register_plugin)(Registrar&);
   bool optimized;  ///< whether its code was compiled with optimisation; read after `fingerprint`
+  const PluginLayer* layers;  ///< up to one without a name; read after `fingerprint`
 };
 
 #define CAIRN_STRINGIFY_(x) #x

@@ -158,6 +158,11 @@ class CAIRN_API Registry {
     return make<Interface>(to_spec(name, options));
   }
 
+  /// A component of any kind, for what is done with all alike.
+  std::unique_ptr<Component> make_any(std::string_view kind, const ComponentSpec& spec) {
+    return make_component(kind, spec);
+  }
+
   /// The options that a name takes; loads its plugin.
   const OptionTable& options(std::string_view kind, std::string_view name);
 

@@ -13,6 +13,6 @@ void do_register(cairn::Registrar& registrar) {
 extern "C" CAIRN_API const cairn::PluginManifest* cairn_plugin_v1() {
   static const cairn::PluginManifest manifest{
       "foreign",    "1.0.0", "BSD-3-Clause", "", kOffers, 1, "cairn abi 0; msvc 19; Eigen 2",
-      &do_register, true};
+      &do_register, true,    nullptr};
   return &manifest;
 }

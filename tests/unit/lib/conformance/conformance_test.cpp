@@ -111,7 +111,8 @@ TEST(Conformance, MakesEveryNameAtLeast) {
   offers[1].name = "EDGE_OWN";
   offers[2].kind = "a_kind_of_its_own";
   offers[2].name = "x";
-  const auto cases = conformance_cases(offers);
+  Registry registry;
+  const auto cases = conformance_cases(offers, registry);
   std::set<std::string> names;
   for (const ConformanceCase& one : cases) names.insert(one.name);
   EXPECT_THAT(names, SizeIs(3));

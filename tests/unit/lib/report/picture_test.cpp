@@ -5,8 +5,8 @@
 #include <boost/json/parse.hpp>
 
 #include "cairn/io/generator.hpp"
+#include "cairn/io/packed_array.hpp"
 #include "cairn/plugin/registry.hpp"
-#include "cairn/report/packed_array.hpp"
 #include "cairn/report/scene.hpp"
 #include "cairn/runtime/error.hpp"
 

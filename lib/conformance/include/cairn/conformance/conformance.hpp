@@ -59,8 +59,11 @@ class CAIRN_API ConformanceObserver {
 };
 
 /// The groups of checks that there are for these names, in the order of the offers. Every name has
-/// at least one: that it can be made, with every choice of its options.
-CAIRN_API std::vector<ConformanceCase> conformance_cases(std::span<const Offer> offers);
+/// at least one: that it can be made, with every choice of its options. The checks of kinds that
+/// the core does not know, such as policies, are components of kind `checks` (checker.hpp): they
+/// are found where `registry` finds their plugin.
+CAIRN_API std::vector<ConformanceCase> conformance_cases(std::span<const Offer> offers,
+                                                         Registry& registry);
 
 /// Runs one group of checks. Whatever the plugin's code throws becomes a finding that names the
 /// function called; only `std::bad_alloc` passes. Throws `Error` (usage) for a group that does not
