@@ -6,8 +6,8 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <numeric>
 
+#include "cairn/graph/disjoint_sets.hpp"
 #include "cairn/types/factor_call.hpp"
 #include "free_alone.hpp"
 
@@ -96,15 +96,7 @@ std::vector<double> weights_of(const Graph& graph, std::size_t pool, const Value
 std::vector<bool> determined_by_whole_relative_poses(const Graph& graph,
                                                      const std::vector<bool>& held,
                                                      const Values& values) {
-  std::vector<std::int32_t> parent(held.size());
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](std::int32_t v) {
-    while (parent[static_cast<std::size_t>(v)] != v) {
-      std::int32_t& up = parent[static_cast<std::size_t>(v)];
-      v = up = parent[static_cast<std::size_t>(up)];
-    }
-    return v;
-  };
+  DisjointSets sets(static_cast<int>(held.size()));
   for (std::size_t p = 0; p < graph.factor_pools().size(); ++p) {
     const FactorPool& pool = graph.factor_pools()[p];
     const int n = pool.type->residual_size();
@@ -113,16 +105,14 @@ std::vector<bool> determined_by_whole_relative_poses(const Graph& graph,
     for (std::size_t f = 0; f < pool.size(); ++f) {
       if (pool.ranks[static_cast<std::size_t>(pool.noises[f])] < n) continue;
       if (!weights.empty() && !(weights[f] > 0.0)) continue;
-      const std::int32_t a = root(pool.variables[2 * f]), b = root(pool.variables[2 * f + 1]);
-      parent[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
+      sets.join(pool.variables[2 * f], pool.variables[2 * f + 1]);
     }
   }
   std::vector<bool> determined(held.size(), false);
   for (std::size_t v = 0; v < held.size(); ++v)
-    if (held[v]) determined[static_cast<std::size_t>(root(static_cast<std::int32_t>(v)))] = true;
+    if (held[v]) determined[static_cast<std::size_t>(sets.find(static_cast<int>(v)))] = true;
   for (std::size_t v = 0; v < held.size(); ++v)
-    determined[v] =
-        held[v] || determined[static_cast<std::size_t>(root(static_cast<std::int32_t>(v)))];
+    determined[v] = held[v] || determined[static_cast<std::size_t>(sets.find(static_cast<int>(v)))];
   return determined;
 }
 

@@ -2,34 +2,12 @@
 #include "cairn/graph/gauge.hpp"
 
 #include <algorithm>
-#include <numeric>
 
 #include <fmt/format.h>
 
+#include "cairn/graph/disjoint_sets.hpp"
+
 namespace cairn {
-namespace {
-
-/// Union-find over variables with path halving.
-class Forest {
- public:
-  explicit Forest(int size) : parent_(size) { std::iota(parent_.begin(), parent_.end(), 0); }
-  int root(int v) {
-    while (parent_[v] != v) v = parent_[v] = parent_[parent_[v]];
-    return v;
-  }
-  /// The smaller index stays the root, so that a component is named by its first variable.
-  void join(int a, int b) {
-    if (parent_[a] == parent_[b]) return;  // most have been joined before
-    a = root(a);
-    b = root(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<int> parent_;
-};
-
-}  // namespace
 
 Gauge resolve_gauge(const Graph& graph) {
   const int n = graph.variable_count();
@@ -37,7 +15,7 @@ Gauge resolve_gauge(const Graph& graph) {
   gauge.held.assign(n, false);
   gauge.component.assign(n, -1);
 
-  Forest forest(n);
+  DisjointSets sets(n);
   std::vector<char> touched(n, false);
   std::vector<std::int64_t> prior_size(n, 0);
   for (const FactorPool& pool : graph.factor_pools()) {
@@ -48,7 +26,7 @@ Gauge resolve_gauge(const Graph& graph) {
       touched[first] = true;
       for (std::size_t a = 1; a < arity; ++a) {
         touched[pool.variables[k + a]] = true;
-        forest.join(first, pool.variables[k + a]);
+        sets.join(first, pool.variables[k + a]);
       }
       if (absolute) prior_size[first] += graph.absolute_size(pool.sequence[k / arity]);
     }
@@ -67,7 +45,7 @@ Gauge resolve_gauge(const Graph& graph) {
       gauge.unconstrained.push_back(v);
       gauge.held[v] = true;
     }
-    const int root = forest.root(v);
+    const int root = sets.find(v);
     if (root == v) {
       gauge.component[v] = static_cast<int>(components.size());
       components.emplace_back();

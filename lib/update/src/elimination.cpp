@@ -5,13 +5,13 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <numeric>
 #include <optional>
 #include <unordered_map>
 #include <utility>
 
 #include <fmt/core.h>
 
+#include "cairn/graph/disjoint_sets.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/types/factor_call.hpp"
 #include "cairn/types/loss.hpp"
@@ -78,24 +78,18 @@ class Eliminator {
 
   /// Factors that share a variable to be eliminated, together; in the order of their first.
   std::vector<std::vector<int>> groups() const {
-    std::vector<int> parent(factors_.size());
-    std::iota(parent.begin(), parent.end(), 0);
-    const auto root = [&](int k) {
-      while (parent[k] != k) k = parent[k] = parent[parent[k]];
-      return k;
-    };
+    DisjointSets sets(static_cast<int>(factors_.size()));
     std::unordered_map<int, int> first;  // by eliminated variable: the first factor on it
     for (int k = 0; k < std::ssize(factors_); ++k) {
       for (const std::int32_t v : graph_.factor_variables(factors_[k])) {
         if (!is_eliminated(v)) continue;
-        const int a = root(first.try_emplace(v, k).first->second), b = root(k);
-        parent[std::max(a, b)] = std::min(a, b);
+        sets.join(first.try_emplace(v, k).first->second, k);
       }
     }
     std::vector<std::vector<int>> result;
     std::vector<int> group(factors_.size(), -1);
     for (int k = 0; k < std::ssize(factors_); ++k) {
-      int& g = group[root(k)];
+      int& g = group[sets.find(k)];
       if (g < 0) {
         g = static_cast<int>(result.size());
         result.emplace_back();

@@ -6,10 +6,11 @@
 #include <cmath>
 #include <cstring>
 #include <new>
-#include <numeric>
 #include <utility>
 
 #include <opencv2/imgproc.hpp>
+
+#include "cairn/graph/disjoint_sets.hpp"
 
 namespace cairn::exploration {
 namespace {
@@ -32,28 +33,6 @@ std::vector<T> moved(const std::vector<T>& cells, const GridFrame& from, const G
   }
   return result;
 }
-
-/// Sets of cells that hang together.
-class Parts {
- public:
-  explicit Parts(std::size_t count) : parent_(count) {
-    std::iota(parent_.begin(), parent_.end(), 0);
-  }
-  int root(int k) {
-    while (parent_[index(k)] != k) k = parent_[index(k)] = parent_[index(parent_[index(k)])];
-    return k;
-  }
-  /// The root of both is the smaller one.
-  void join(int a, int b) {
-    a = root(a);
-    b = root(b);
-    parent_[index(std::max(a, b))] = std::min(a, b);
-  }
-
- private:
-  static std::size_t index(int k) { return static_cast<std::size_t>(k); }
-  std::vector<int> parent_;
-};
 
 }  // namespace
 
@@ -235,7 +214,7 @@ std::vector<std::int32_t> FloorClassifier::border_cells() const {
 void FloorClassifier::find_frontiers() {
   const GridFrame& frame = map_.frame;
   const std::vector<std::int32_t> cells = border_cells();
-  Parts parts(cells.size());
+  DisjointSets parts(static_cast<int>(cells.size()));
   for (std::size_t k = 0; k < cells.size(); ++k) {
     const int x = cells[k] % frame.width, y = cells[k] / frame.width, number = static_cast<int>(k);
     part_[static_cast<std::size_t>(cells[k])] = number;
@@ -249,7 +228,7 @@ void FloorClassifier::find_frontiers() {
   std::vector<std::int32_t> frontier_of(cells.size(), -1);
   for (std::size_t k = 0; k < cells.size(); ++k) {
     part_[static_cast<std::size_t>(cells[k])] = -1;
-    std::int32_t& frontier = frontier_of[static_cast<std::size_t>(parts.root(static_cast<int>(k)))];
+    std::int32_t& frontier = frontier_of[static_cast<std::size_t>(parts.find(static_cast<int>(k)))];
     if (frontier < 0) {
       frontier = static_cast<std::int32_t>(map_.frontiers.size());
       map_.frontiers.emplace_back();

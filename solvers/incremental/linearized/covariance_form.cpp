@@ -9,6 +9,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
 
+#include "cairn/graph/disjoint_sets.hpp"
 #include "cairn/runtime/error.hpp"
 
 namespace cairn::linearized {
@@ -72,25 +73,22 @@ bool CovarianceForm::settle() {
 }
 
 std::vector<CovarianceForm::Group> CovarianceForm::groups() const {
-  std::map<Id, Id> parent;
-  const auto root = [&](Id id) {
-    while (parent.at(id) != id) id = parent.at(id);
-    return id;
-  };
-  for (const Id id : waiting_) parent.emplace(id, id);
+  std::map<Id, int> number;
+  for (const Id id : waiting_) number.emplace(id, static_cast<int>(number.size()));
+  DisjointSets sets(static_cast<int>(number.size()));
   for (const Rows& rows : pending_) {
-    Id first = -1;
-    bool found = false;
+    int first = -1;
     for (const Id id : rows.variables) {
       if (!sizes_.contains(id)) continue;
-      if (found) parent[root(id)] = root(first);
-      if (!std::exchange(found, true)) first = id;
+      const int k = number.at(id);
+      if (first < 0) first = k;
+      sets.join(first, k);
     }
   }
-  std::map<Id, std::size_t> place;
+  std::map<int, std::size_t> place;
   std::vector<Group> result;
   const auto group_of = [&](Id id) -> Group& {
-    const auto [at, is_new] = place.try_emplace(root(id), result.size());
+    const auto [at, is_new] = place.try_emplace(sets.find(number.at(id)), result.size());
     if (is_new) result.emplace_back();
     return result[at->second];
   };

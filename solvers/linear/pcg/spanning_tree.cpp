@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
+#include "cairn/graph/disjoint_sets.hpp"
 #include "cairn/runtime/threads.hpp"
 
 namespace cairn {
@@ -26,27 +26,6 @@ std::vector<Edge> edges_of(const BlockStructure& s) {
   }
   return edges;
 }
-
-/// Which component a block is in, with path halving.
-class Components {
- public:
-  explicit Components(int count) : parent_(static_cast<std::size_t>(count)) {
-    std::iota(parent_.begin(), parent_.end(), 0);
-  }
-  std::int32_t find(std::int32_t k) {
-    while (parent_[k] != k) k = parent_[k] = parent_[parent_[k]];
-    return k;
-  }
-  bool join(std::int32_t a, std::int32_t b) {
-    a = find(a);
-    b = find(b);
-    parent_[a] = b;
-    return a != b;
-  }
-
- private:
-  std::vector<std::int32_t> parent_;
-};
 
 /// A forest with its roots, and the length of the way between two of its blocks.
 class Forest {
@@ -131,7 +110,7 @@ std::vector<std::int64_t> choose_subgraph(const BlockStructure& structure,
   std::stable_sort(edges.begin(), edges.end(), [&](const Edge& x, const Edge& y) {
     return strength[x.entry] > strength[y.entry];
   });
-  Components components(structure.blocks());
+  DisjointSets components(structure.blocks());
   const auto rest = std::stable_partition(edges.begin(), edges.end(), [&](const Edge& edge) {
     return components.join(edge.a, edge.b);
   });
