@@ -11,6 +11,10 @@ namespace {
 /// The middle of a frontier moves by less while it is seen better [m].
 constexpr double kSameGoal = 1.0;
 
+/// Radii of the body: a frontier that is longer and cannot be reached is more than what remains
+/// behind ragged walls where all has been seen, which is at most 14.
+constexpr double kMuch = 20.0;
+
 /// The sentence with which a run without any frontier left ends.
 std::string end_text(const FrontierGoals& goals, double smallest) {
   if (goals.unreachable() == 0)
@@ -52,8 +56,13 @@ Decision FrontierExplorer::decide(const Situation& situation) {
           fmt::format("none of {} frontiers can be reached: it looks around", goals_.unreachable());
       return decision;
     }
-    decision.kind = Decision::Kind::finished;
+    const bool much_is_left = goals_.longest_unreachable() > kMuch * situation.robot.radius;
+    decision.kind = much_is_left ? Decision::Kind::stuck : Decision::Kind::finished;
     decision.why = end_text(goals_, smallest);
+    if (much_is_left) {
+      decision.why +=
+          "; smaller cells of the map, such as log_odds:resolution=0.05, leave narrow gaps open";
+    }
     return decision;
   }
   for (Candidate& candidate : decision.candidates) {
