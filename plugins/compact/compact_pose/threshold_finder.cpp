@@ -107,10 +107,11 @@ void ThresholdFinder::forget_loop(double gain, const Matrix& covariance) {
 
 Matrix ThresholdFinder::sensor() const {
   if (loops_.empty()) {
-    throw Error(ErrorCode::input,
-                "no loop closure in the sample was taken (a policy's gate may have refused some), so "
-                "the sensor's range is unknown: take a larger part of the data, a larger gate, or "
-                "give the thresholds");
+    throw Error(
+        ErrorCode::input,
+        "no loop closure in the sample was taken (a policy's gate may have refused some), so "
+        "the sensor's range is unknown: take a larger part of the data, a larger gate, or "
+        "give the thresholds");
   }
   std::vector<Matrix> covariances;
   for (const Loop& loop : loops_) covariances.push_back(loop.covariance);

@@ -100,7 +100,8 @@ class GlassWorld final : public World {
   double x_;
 };
 
-/// It finds that there is no way instead of driving against it until the run is stuck.
+/// It finds that there is no way to what is left instead of driving against the glass again and
+/// again.
 TEST(ExplorationRun, WhatTheRobotTouchesTwiceIsInTheWayThoughNoScanShowsIt) {
   std::vector<std::string> rows(16, std::string(160, '.'));
   rows.front() = rows.back() = std::string(160, '#');
@@ -112,7 +113,7 @@ TEST(ExplorationRun, WhatTheRobotTouchesTwiceIsInTheWayThoughNoScanShowsIt) {
   Exploration run = parts.on(floor);
   run.start.pose = Pose2(1.0, 0.4, 0.0);
   const ExplorationResult result = run_exploration(run);
-  EXPECT_EQ(result.end, ExplorationEnd::finished) << result.why;
+  EXPECT_EQ(result.end, ExplorationEnd::stuck) << result.why;  // what is behind the glass is left
   EXPECT_THAT(result.why, HasSubstr("that can be reached"));
   EXPECT_GE(result.collisions, 2);
   EXPECT_LT(result.collisions, 10);
