@@ -7,9 +7,10 @@
 #include <fmt/core.h>
 
 #include "cairn/program/error_metric.hpp"
+#include "cairn/program/figures.hpp"
 #include "cairn/program/json_report.hpp"
 #include "cairn/program/table.hpp"
-#include "cairn/report/number_table.hpp"
+#include "cairn/runtime/result_fields.hpp"
 #include "cairn/runtime/threads.hpp"
 
 namespace cairn::app {
@@ -103,7 +104,7 @@ json::array runs_json(const ConfigurationResult& result, const Stop& stop) {
                    {"out_of_time", ran_out_of_time(run, stop)},
                    {"chi2", {{"initial", run.initial_chi2}, {"final", run.final_chi2}}},
                    {"iterations", run.iterations.size()},
-                   {"seconds", seconds_json(run.seconds)}});
+                   {"seconds", to_json(run.seconds)}});
   }
   return all;
 }
@@ -132,7 +133,7 @@ json::object configuration_json(const ConfigurationResult& result, const GraphRe
     all["iterations"] = first.iterations.size();
     all["seconds"] = times_json(result);
     all["ratio"] = paired_ratio(result, graph);
-    all["solver"] = solver_json(first.solver);
+    all["solver"] = to_json(first.solver);
     std::vector<std::string> notes = first.notes;
     notes.insert(notes.end(), result.doubts.begin(), result.doubts.end());
     all["notes"] = strings_json(notes);
@@ -143,35 +144,52 @@ json::object configuration_json(const ConfigurationResult& result, const GraphRe
   all["peak_memory_bytes"] =
       result.peak_memory > 0 ? json::value(result.peak_memory) : json::value(nullptr);
   all["runs"] = runs_json(result, stop);
-  if (!result.runs.empty()) all["history"] = iterations_json(median_run(result));
+  if (!result.runs.empty()) all["history"] = to_json(median_run(result).iterations);
   return all;
 }
 
-std::string csv_line(const std::vector<std::string>& fields) {
-  return fmt::format("{}\r\n", joined(fields, ","));
-}
+/// A run in the table of `--csv`.
+struct RunRow {
+  const GraphResult& graph;
+  const ConfigurationResult& result;
+  std::size_t round;
 
-std::vector<std::string> csv_fields(const GraphResult& graph, const ConfigurationResult& result,
-                                    std::size_t round) {
-  const Summary& run = result.runs[round];
-  const Seconds& s = run.seconds;
-  std::vector<std::string> fields;
-  for (const std::string& text :
-       {graph.loaded.label, result.configuration.optimizer, linear_solver_name(result),
-        std::string(to_string(run.status)), cpu_name()}) {
-    fields.push_back(csv_field(text));
+  const Summary& run() const { return result.runs[round]; }
+  static ResultFields<RunRow> fields() {
+    using R = RunRow;
+    return ResultFields<R>()
+        .figure(
+            "graph", [](const R& r) { return r.graph.loaded.label; }, "its name")
+        .figure(
+            "optimizer", [](const R& r) { return r.result.configuration.optimizer; },
+            "as it was written")
+        .figure(
+            "linear_solver", [](const R& r) { return linear_solver_name(r.result); },
+            "as it was written, or what the optimizer took")
+        .figure(
+            "status", [](const R& r) { return r.run().status; }, "how it ended")
+        .figure(
+            "cpu", [](const R&) { return cpu_name(); }, "the processor")
+        .figure(
+            "threads", [](const R&) { return threads(); }, "threads")
+        .figure(
+            "round", [](const R& r) { return r.round + 1; }, "from 1")
+        .figure(
+            "iterations", [](const R& r) { return r.run().iterations.size(); }, "iterations")
+        .figure(
+            "factor_nonzeros", [](const R& r) { return r.run().solver.factor_nonzeros; },
+            "numbers in the factor of H; 0: not known")
+        .figure(
+            "peak_memory_bytes", [](const R& r) { return r.result.peak_memory; }, "bytes",
+            "of the configuration; 0: not measured")
+        .figure(
+            "chi2.initial", [](const R& r) { return r.run().initial_chi2; },
+            "of the initial estimate")
+        .figure(
+            "chi2.final", [](const R& r) { return r.run().final_chi2; }, "at the end")
+        .part("seconds", [](const R& r) { return r.run().seconds; });
   }
-  for (const std::int64_t number : {std::int64_t{threads()}, static_cast<std::int64_t>(round + 1),
-                                    static_cast<std::int64_t>(run.iterations.size()),
-                                    run.solver.factor_nonzeros, result.peak_memory}) {
-    fields.push_back(fmt::format("{}", number));
-  }
-  for (const double number : {run.initial_chi2, run.final_chi2, s.total, s.linearize, s.analyze,
-                              s.factorize, s.solve, s.update}) {
-    fields.push_back(fmt::format("{}", number));
-  }
-  return fields;
-}
+};
 
 }  // namespace
 
@@ -237,18 +255,14 @@ json::object bench_json(const BenchOptions& options, const BenchResult& result) 
 }
 
 std::string bench_csv(const std::vector<GraphResult>& graphs) {
-  std::string text =
-      csv_line({"graph", "optimizer", "linear_solver", "status", "cpu", "threads", "round",
-                "iterations", "factor_nonzeros", "peak_memory_bytes", "chi2_initial", "chi2_final",
-                "seconds_total", "seconds_linearize", "seconds_analyze", "seconds_factorize",
-                "seconds_solve", "seconds_update"});
+  CsvText csv(result_fields<RunRow>().all(), CsvText::Numbers::whole, "\r\n");
   for (const GraphResult& graph : graphs) {
     for (const ConfigurationResult& result : graph.results) {
       for (std::size_t k = 0; k < result.runs.size(); ++k)
-        text += csv_line(csv_fields(graph, result, k));
+        csv.add(result_record(RunRow{graph, result, k}));
     }
   }
-  return text;
+  return csv.text();
 }
 
 }  // namespace cairn::app

@@ -20,6 +20,7 @@
 #include "cairn/program/command.hpp"
 #include "cairn/program/covariances.hpp"
 #include "cairn/program/error_metric.hpp"
+#include "cairn/program/figures.hpp"
 #include "cairn/program/graph_files.hpp"
 #include "cairn/program/interrupt.hpp"
 #include "cairn/program/json_report.hpp"
@@ -354,7 +355,7 @@ json::object report_json(const MarginalsOptions& options, const LoadedGraph& loa
                        {"optimize", summary ? summary->seconds.total : 0.0},
                        {"factorize", answer.factorize},
                        {"marginals", answer.marginals}};
-  report["solver"] = solver_json(stats);
+  report["solver"] = to_json(stats);
   report["notes"] = strings_json(summary ? summary->notes : std::vector<std::string>{});
   report["doubts"] = strings_json(summary ? summary->doubts : std::vector<std::string>{});
   report["read_notes"] = strings_json(sentences(loaded.report));

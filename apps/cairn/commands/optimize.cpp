@@ -15,6 +15,8 @@
 #include "cairn/program/command.hpp"
 #include "cairn/program/covariances.hpp"
 #include "cairn/program/error_metric.hpp"
+#include "cairn/program/figure_files.hpp"
+#include "cairn/program/figures.hpp"
 #include "cairn/program/graph_files.hpp"
 #include "cairn/program/interrupt.hpp"
 #include "cairn/program/json_report.hpp"
@@ -43,6 +45,7 @@ struct OptimizeOptions {
   std::string linear_solver;  ///< empty: not given
   std::string covariance = "none";
   std::string record;  ///< file for the recording, or empty
+  FigureFiles figures;
 
   static auto fields() {
     using O = OptimizeOptions;
@@ -67,6 +70,7 @@ struct OptimizeOptions {
         .placeholder("FILE")
         .choice("covariance", &O::covariance, {"blocks", "none"},
                 "blocks of every variable, in the report, or none")
+        .part(&O::figures)
         .part(&O::input);
   }
 };
@@ -77,6 +81,7 @@ void check(const OptimizeOptions& options, Session& session) {
     throw Error(ErrorCode::usage, "--record writes to a file, not to standard output; name one");
   }
   check_file(options.record, session);
+  options.figures.check(session);
 }
 
 /// What `--initial` did.
@@ -105,22 +110,13 @@ json::object report_json(const OptimizeOptions& options, const LoadedGraph& load
                          const DiagonalCovariances& covariances) {
   json::object report = begin_report("optimize");
   report["graph"] = graph_json(loaded.graph, loaded.name, loaded.label);
-  report["optimizer"] = summary.optimizer;
-  report["linear_solver"] = summary.linear_solver;
   report["threads"] = threads();
   report["initial"] = options.problem.initial;
   report["initial_notes"] = strings_json(initial.notes);
   report["loss"] = text_json(options.problem.loss);
-  report["status"] = to_string(summary.status);
-  report["chi2"] = {{"initial", summary.initial_chi2}, {"final", summary.final_chi2}};
-  report["iterations"] = iterations_json(summary);
-  json::object seconds{{"read", loaded.seconds}, {"initial", initial.seconds}};
-  for (const auto& member : seconds_json(summary.seconds)) seconds.insert(member);
-  report["seconds"] = std::move(seconds);
-  report["solver"] = solver_json(summary.solver);
+  report["seconds"] = {{"read", loaded.seconds}, {"initial", initial.seconds}};
+  put(report, summary);
   report["covariance"] = to_json(covariances, loaded.graph);
-  report["notes"] = strings_json(summary.notes);
-  report["doubts"] = strings_json(summary.doubts);
   report["read_notes"] = strings_json(sentences(loaded.report));
   report["output"] = text_json(options.output);
   report["recording"] = text_json(options.record);
@@ -128,17 +124,11 @@ json::object report_json(const OptimizeOptions& options, const LoadedGraph& load
   return report;
 }
 
-std::string times_text(const Seconds& seconds) {
-  return fmt::format("{} (linearize {}, analyze {}, factorize {}, solve {}, update {})",
-                     seconds_text(seconds.total), seconds_text(seconds.linearize),
-                     seconds_text(seconds.analyze), seconds_text(seconds.factorize),
-                     seconds_text(seconds.solve), seconds_text(seconds.update));
-}
-
 std::string summary_text(const OptimizeOptions& options, const LoadedGraph& loaded,
                          const InitialEstimate& initial, const Summary& summary,
                          const DiagonalCovariances& covariances, const Results& results,
                          const Session& session) {
+  const Figures figures(summary);
   Table table({{"", Table::Align::left}, {"", Table::Align::left}});
   table.add({"graph", fmt::format("{}: {}, {}", loaded.label,
                                   plural(loaded.graph.variable_count(), "variable"),
@@ -148,16 +138,16 @@ std::string summary_text(const OptimizeOptions& options, const LoadedGraph& load
   table.add({"solver", summary.linear_solver.empty()
                            ? summary.optimizer
                            : fmt::format("{} with {}", summary.optimizer, summary.linear_solver)});
-  table.add({"chi2", fmt::format("{} → {}", chi2_text(summary.initial_chi2),
-                                 chi2_text(summary.final_chi2))});
-  table.add({"status", fmt::format("{} after {}", to_string(summary.status),
+  table.add({"chi2", fmt::format("{} → {}", figures["chi2.initial"], figures["chi2.final"])});
+  table.add({"status", fmt::format("{} after {}", figures["status"],
                                    plural(std::ssize(summary.iterations), "iteration"))});
-  table.add({"time", times_text(summary.seconds)});
+  table.add({"time", figures.times("seconds")});
   if (summary.solver.iterations > 0) {
-    table.add({"inner", fmt::format("{}, relative residual at most {:.1e}; {}",
+    table.add({"inner", fmt::format("{}, relative residual at most {}; {}",
                                     plural(summary.solver.iterations, "iteration"),
-                                    summary.solver.relative_residual, summary.solver.note)});
+                                    figures["solver.relative_residual"], summary.solver.note)});
   }
+  figures.add_rows(table);
   if (covariances.there) {
     table.add({"covariance",
                fmt::format("of {} by {} in {}", plural(loaded.graph.variable_count(), "variable"),
@@ -233,6 +223,7 @@ int run(const OptimizeOptions& options, Session& session) {
   results.write(options.record, [&] { recording->finish(loaded.graph, summary); });
   results.add(
       [&] { session.write_json(report_json(options, loaded, initial, summary, covariances)); });
+  options.figures.write(Figures(summary), results);
   results.add([&] {
     session.print(summary_text(options, loaded, initial, summary, covariances, results, session));
   });

@@ -23,6 +23,7 @@
 #include "factors.hpp"
 #include "ids.hpp"
 #include "measured.hpp"
+#include "result_attributes.hpp"
 #include "types_of.hpp"
 
 namespace cairn::python {
@@ -128,46 +129,14 @@ std::unique_ptr<BoundEstimator> copy(BoundEstimator& bound) {
 
 // Classes -----------------------------------------------------------------------------------------
 
-py::dict seconds_of(const UpdateReport& report) {
-  py::dict result;
-  result["total"] = report.seconds.total;
-  result["linearize"] = report.seconds.linearize;
-  result["order"] = report.seconds.order;
-  result["factorize"] = report.seconds.factorize;
-  result["solve"] = report.seconds.solve;
-  result["check"] = report.seconds.check;
-  result["marginals"] = report.seconds.marginals;
-  return result;
-}
-
 void bind_report(py::module_& module) {
-  py::class_<UpdateReport>(module, "UpdateReport", "What an update did.")
-      .def_readonly("ok", &UpdateReport::ok,
-                    "False: the measurements do not determine every variable; the estimate is the "
-                    "best available.")
-      .def_readonly("converged", &UpdateReport::converged)
-      .def_readonly("first_factor", &UpdateReport::first_factor,
-                    "Number of the first of its new factors; the others follow it.")
-      .def_readonly("priors", &UpdateReport::priors,
-                    "Numbers of the priors that marginalisation left.")
-      .def_readonly("iterations", &UpdateReport::iterations, "Linear systems solved.")
-      .def_readonly("affected_variables", &UpdateReport::affected_variables,
-                    "Variables whose part of the factorisation was computed again.")
-      .def_readonly("relinearized_factors", &UpdateReport::relinearized_factors,
-                    "Besides the new ones.")
-      .def_readonly("owed", &UpdateReport::owed,
-                    "Factors whose relinearisation was deferred to later updates.")
-      .def_property_readonly("seconds", &seconds_of,
-                             "Of each part: linearize, order, factorize, solve, check, marginals; "
-                             "total.")
-      .def_readonly("notes", &UpdateReport::notes, "Sentences for the user.")
-      .def_readonly("doubts", &UpdateReport::doubts,
-                    "What gives reason to doubt the estimate, after every update while it lasts.")
-      .def("__repr__", [](const UpdateReport& report) {
-        return fmt::format("<cairn.UpdateReport {}: {} affected, {} relinearized, {:.3g} s>",
-                           report.ok ? "ok" : "not ok", report.affected_variables,
-                           report.relinearized_factors, report.seconds.total);
-      });
+  py::class_<UpdateReport> type(module, "UpdateReport", "What an update did.");
+  type.def("__repr__", [](const UpdateReport& report) {
+    return fmt::format("<cairn.UpdateReport {}: {} affected, {} relinearized, {:.3g} s>",
+                       report.ok ? "ok" : "not ok", report.affected_variables,
+                       report.relinearized_factors, report.seconds.total);
+  });
+  bind_fields<UpdateReport>(type);
 }
 
 void bind_changes(py::class_<BoundEstimator, HasEstimator>& estimator) {

@@ -27,6 +27,7 @@
 #include "graph_arrays.hpp"
 #include "interrupt.hpp"
 #include "named_guess.hpp"
+#include "result_attributes.hpp"
 
 namespace cairn::python {
 namespace {
@@ -121,59 +122,24 @@ Summary optimize(BoundGraph& bound, const std::string& optimizer, const py::obje
   return summary;
 }
 
-py::dict seconds_of(const Summary& summary) {
-  const Seconds& seconds = summary.seconds;
-  py::dict result;
-  result["total"] = seconds.total;
-  result["linearize"] = seconds.linearize;
-  result["analyze"] = seconds.analyze;
-  result["factorize"] = seconds.factorize;
-  result["solve"] = seconds.solve;
-  result["update"] = seconds.update;
-  return result;
-}
-
 void bind_iteration(py::module_& module) {
-  py::class_<BoundIteration, std::shared_ptr<BoundIteration>>(module, "Iteration",
-                                                              "One iteration of an optimisation.")
-      .def_property_readonly(
-          "number", [](const BoundIteration& it) { return it.iteration.number; }, "From 1.")
-      .def_property_readonly(
-          "chi2", [](const BoundIteration& it) { return it.iteration.chi2; },
-          "Of the estimate after it.")
-      .def_property_readonly(
-          "step_norm", [](const BoundIteration& it) { return it.iteration.step_norm; },
-          "Euclidean norm of the step in the tangent space.")
-      .def_property_readonly(
-          "damping", [](const BoundIteration& it) { return it.iteration.lambda; },
-          "lambda, or the inverse of the radius of the trust region; 0 where there is none.")
-      .def_property_readonly(
-          "accepted", [](const BoundIteration& it) { return it.iteration.accepted; },
-          "Whether the step was taken.")
-      .def_property_readonly(
-          "seconds", [](const BoundIteration& it) { return it.iteration.seconds; },
-          "Of this iteration.")
-      .def("states", &states_at, py::arg("type"),
+  py::class_<BoundIteration, std::shared_ptr<BoundIteration>> type(
+      module, "Iteration", "One iteration of an optimisation.");
+  type.def("states", &states_at, py::arg("type"),
            "In a callback: the best estimates so far of all variables of a type, (n, m), in the "
            "order of `Graph.ids(type)`.")
       .def("__repr__", [](const BoundIteration& it) {
         return fmt::format("<cairn.Iteration {}: chi2 {:.6g}>", it.iteration.number,
                            it.iteration.chi2);
       });
+  bind_fields<Iteration>(type,
+                         [](const BoundIteration& it) -> const Iteration& { return it.iteration; });
 }
 
 void bind_summary(py::module_& module) {
-  py::class_<Summary>(module, "Summary", "How an optimisation ended.")
-      .def_readonly("optimizer", &Summary::optimizer)
-      .def_readonly("linear_solver", &Summary::linear_solver)
-      .def_property_readonly(
-          "status", [](const Summary& summary) { return std::string(to_string(summary.status)); },
-          "'converged', 'max_iterations', 'diverged', 'not_positive_definite' or 'interrupted'. "
-          "Whatever it is, the graph has the best estimate found.")
-      .def_property_readonly(
+  py::class_<Summary> type(module, "Summary", "How an optimisation ended.");
+  type.def_property_readonly(
           "converged", [](const Summary& summary) { return summary.status == Status::converged; })
-      .def_readonly("initial_chi2", &Summary::initial_chi2)
-      .def_readonly("chi2", &Summary::final_chi2, "At the end.")
       .def_property_readonly(
           "iterations",
           [](const Summary& summary) {
@@ -182,17 +148,13 @@ void bind_summary(py::module_& module) {
             return all;
           },
           "A list of Iteration.")
-      .def_property_readonly("seconds", &seconds_of,
-                             "Of each part: linearize, analyze, factorize, solve, update; total.")
-      .def_readonly("notes", &Summary::notes, "Sentences for the user, such as what was anchored.")
-      .def_readonly("doubts", &Summary::doubts,
-                    "Those of the notes that give reason to doubt the estimate.")
       .def("__repr__",
            [](const Summary& summary) {
              const std::string text = to_string(summary);
              return "<cairn.Summary " + text.substr(0, text.find('\n')) + ">";
            })
       .def("__str__", [](const Summary& summary) { return to_string(summary); });
+  bind_fields<Summary>(type);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <fmt/core.h>
 
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/result_fields.hpp"
 #include "cairn/solve/initial_guess.hpp"
 
 namespace cairn {
@@ -53,6 +54,42 @@ void Observer::on_message(std::string_view) {}
 Summary Optimizer::optimize(Graph& graph, const Stop& stop) {
   Observer nobody;
   return optimize(graph, stop, nobody);
+}
+
+ResultFields<Iteration> Iteration::fields() {
+  using I = Iteration;
+  return ResultFields<I>()
+      .figure("number", &I::number, "from 1")
+      .figure("chi2", &I::chi2, "of the estimate after it")
+      .round("{:.8g}")
+      .figure("step_norm", &I::step_norm, "Euclidean norm of the step in the tangent space")
+      .figure("lambda", &I::lambda,
+              "damping, or the inverse of the radius of the trust region; 0 where there is none")
+      .attribute("damping")
+      .figure("accepted", &I::accepted, "whether the step was taken")
+      .figure("seconds", &I::seconds, "s", "of this iteration");
+}
+
+ResultFields<Summary> Summary::fields() {
+  using S = Summary;
+  return ResultFields<S>()
+      .figure("optimizer", &S::optimizer, "the optimizer")
+      .figure("linear_solver", &S::linear_solver, "what solved the linear systems")
+      .figure("status", &S::status,
+              "converged, max_iterations, diverged, not_positive_definite or interrupted; whatever "
+              "it is, the graph has the best estimate found")
+      .figure("chi2.initial", &S::initial_chi2, "of the initial estimate")
+      .round("{:.8g}")
+      .attribute("initial_chi2")
+      .figure("chi2.final", &S::final_chi2, "at the end")
+      .round("{:.8g}")
+      .attribute("chi2")
+      .figure("iterations", &S::iterations, "each iteration")
+      .part("seconds", &S::seconds)
+      .part("solver", &S::solver)
+      .figure("notes", &S::notes, "sentences for the user, such as what was anchored")
+      .figure("doubts", &S::doubts, "those of the notes that give reason to doubt the estimate")
+      .details();
 }
 
 }  // namespace cairn

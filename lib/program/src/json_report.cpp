@@ -60,36 +60,6 @@ json::object graph_json(const Graph& graph, const std::string& file, const std::
           {"metric", text_json(metric_of(graph))}};
 }
 
-json::object seconds_json(const Seconds& seconds) {
-  return {{"total", seconds.total},     {"linearize", seconds.linearize},
-          {"analyze", seconds.analyze}, {"factorize", seconds.factorize},
-          {"solve", seconds.solve},     {"update", seconds.update}};
-}
-
-json::object solver_json(const LinearSolverStats& stats) {
-  json::object object{{"ordering", stats.ordering},
-                      {"factor_nonzeros", stats.factor_nonzeros},
-                      {"factor_flops", stats.factor_flops},
-                      {"note", stats.note}};
-  if (stats.iterations > 0) {
-    object["iterations"] = stats.iterations;
-    object["relative_residual"] = stats.relative_residual;
-  }
-  return object;
-}
-
-json::array iterations_json(const Summary& summary) {
-  json::array all;
-  for (const Iteration& it : summary.iterations) {
-    all.push_back({{"chi2", it.chi2},
-                   {"step_norm", it.step_norm},
-                   {"lambda", it.lambda},
-                   {"accepted", it.accepted},
-                   {"seconds", it.seconds}});
-  }
-  return all;
-}
-
 json::value text_json(const std::string& text) {
   return text.empty() ? json::value(nullptr) : json::value(text);
 }

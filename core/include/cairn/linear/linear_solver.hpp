@@ -7,7 +7,9 @@
 #include <string_view>
 
 #include "cairn/linear/block_matrix.hpp"
+#include "cairn/runtime/api.hpp"
 #include "cairn/runtime/component.hpp"
+#include "cairn/runtime/result_fields_fwd.hpp"
 
 namespace cairn {
 
@@ -25,6 +27,8 @@ struct LinearSolverStats {
   std::string note;                  ///< what a user should know: "supernodal", "falls back to …"
   std::int64_t iterations = 0;     ///< inner iterations of an iterative solver; 0 for a direct one
   double relative_residual = 0.0;  ///< largest ‖Hx − g‖/‖g‖ so far; iterative solvers only
+
+  CAIRN_API static ResultFields<LinearSolverStats> fields();
 };
 
 /// Solves H x = g for one block structure at a time, many times: `analyze` does all work that

@@ -12,6 +12,7 @@
 #include "cairn/graph/graph.hpp"
 #include "cairn/graph/update.hpp"
 #include "cairn/runtime/component.hpp"
+#include "cairn/runtime/result_fields_fwd.hpp"
 
 namespace cairn {
 
@@ -37,6 +38,8 @@ struct UpdateSeconds {
   double marginals = 0.0;  ///< keeping covariances up to date
 
   CAIRN_API UpdateSeconds& operator+=(const UpdateSeconds& other);
+
+  CAIRN_API static ResultFields<UpdateSeconds> fields();
 };
 
 /// How the covariances that are kept were updated.
@@ -67,6 +70,8 @@ struct UpdateReport {
 
   /// Adds a note that is a reason for doubt.
   CAIRN_API void doubt(std::string sentence);
+
+  CAIRN_API static ResultFields<UpdateReport> fields();
 };
 
 /// Which covariances an estimator keeps up to date after every update.

@@ -10,6 +10,7 @@
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/linear/seconds.hpp"
 #include "cairn/runtime/component.hpp"
+#include "cairn/runtime/result_fields_fwd.hpp"
 
 namespace cairn {
 
@@ -40,6 +41,8 @@ struct Iteration {
   double lambda = 0.0;     ///< damping or 1/trust-region radius; 0 where there is none
   bool accepted = true;
   double seconds = 0.0;  ///< of this iteration
+
+  CAIRN_API static ResultFields<Iteration> fields();
 };
 
 /// Is notified of the progress of an optimisation: the base of progress bars, logs, recordings and
@@ -75,6 +78,8 @@ struct Summary {
 
   /// Adds a note that is a reason for doubt.
   CAIRN_API void doubt(std::string sentence);
+
+  CAIRN_API static ResultFields<Summary> fields();
 };
 
 /// Minimises Σ ρ(‖r‖²) over a graph's variables, starting from its states and leaving the best

@@ -9,7 +9,6 @@
 #include <boost/json/object.hpp>
 
 #include "cairn/graph/graph.hpp"
-#include "cairn/solve/optimizer.hpp"
 
 namespace cairn::app {
 
@@ -23,11 +22,6 @@ void end_report(boost::json::object& report);
 /// null where no factor has a choice.
 boost::json::object graph_json(const Graph& graph, const std::string& file,
                                const std::string& name = "");
-/// The members of "seconds" that an optimisation has.
-boost::json::object seconds_json(const Seconds& seconds);
-boost::json::object solver_json(const LinearSolverStats& stats);
-/// {"chi2", "step_norm", "lambda", "accepted", "seconds"} of each.
-boost::json::array iterations_json(const Summary& summary);
 /// The text, or null where there is none.
 boost::json::value text_json(const std::string& text);
 /// The number, or null where it is not finite.
