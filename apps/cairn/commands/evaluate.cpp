@@ -14,6 +14,7 @@
 #include "cairn/plugin/registry.hpp"
 #include "cairn/program/command.hpp"
 #include "cairn/program/covariances.hpp"
+#include "cairn/program/figures.hpp"
 #include "cairn/program/graph_files.hpp"
 #include "cairn/program/json_report.hpp"
 #include "cairn/program/latex_table.hpp"
@@ -22,11 +23,14 @@
 #include "cairn/program/table.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
+#include "cairn/runtime/result_fields.hpp"
 
 namespace cairn::app {
 namespace {
 
 namespace json = boost::json;
+
+constexpr int kDigits = 6;  // of a divergence, which is compared with others
 
 /// One of the two trajectories.
 struct TrajectoryOptions {
@@ -64,7 +68,7 @@ struct EvaluateOptions {
   bool kld = false;
   std::string compared_at = "common";
   std::string linear_solver = kDefaultLinearSolver;  ///< of the KLD
-  std::string latex;
+  std::string csv, latex;
 
   static auto fields() {
     using O = EvaluateOptions;
@@ -98,6 +102,8 @@ struct EvaluateOptions {
         .placeholder("WHERE")
         .component("linear_solver", &O::linear_solver, {"linear_solver"},
                    "gives covariances for --kld")
+        .text("csv", &O::csv, "the errors as CSV, a line of titles and one of values")
+        .placeholder("FILE")
         .text("latex", &O::latex, kLatexHelp)
         .placeholder("FILE")
         .part(&O::input);
@@ -368,6 +374,33 @@ GraphDivergence divergence_of(const Graph& truth, const Graph& estimate,
 
 // Results -----------------------------------------------------------------------------------------
 
+/// What is written of a comparison.
+struct Evaluation {
+  const TrajectoryError& error;
+  const TrajectoryPairs& pairs;
+  const GraphDivergence& divergence;
+
+  static ResultFields<Evaluation> fields() {
+    using E = Evaluation;
+    return ResultFields<E>()
+        .part([](const E& e) { return e.error; })
+        .without("poses")
+        .figure(
+            "poses.compared", [](const E& e) { return e.error.poses; }, "how many were compared")
+        .figure(
+            "poses.only_in_estimate", [](const E& e) { return e.pairs.only_in_estimate; },
+            "without a partner")
+        .figure(
+            "poses.only_in_truth", [](const E& e) { return e.pairs.only_in_truth; },
+            "without a partner")
+        .details()
+        .part([](const E& e) { return e.divergence.error; })
+        .optional()
+        .without("rmse")
+        .without("rmse_aligned");
+  }
+};
+
 Table divergence_table(const GraphDivergence& divergence, const EvaluateOptions& options) {
   Table table({{fmt::format("KLD of {}, at the states of {}",
                             plural(static_cast<std::int64_t>(divergence.variables), "variable"),
@@ -375,9 +408,10 @@ Table divergence_table(const GraphDivergence& divergence, const EvaluateOptions&
                 Table::Align::left},
                {"nats", Table::Align::right}});
   if (!divergence.error) return table;
-  table.add({"divergence", fmt::format("{:.6g}", divergence.error->kld)});
-  table.add({"of this, covariances", fmt::format("{:.6g}", divergence.error->covariance)});
-  table.add({"and means", fmt::format("{:.6g}", divergence.error->mean)});
+  const Figures figures(*divergence.error, kDigits);
+  table.add({"divergence", figures.number("kld")});
+  table.add({"of this, covariances", figures.number("kld_parts.covariance")});
+  table.add({"and means", figures.number("kld_parts.mean")});
   return table;
 }
 
@@ -387,20 +421,18 @@ Table error_table(const TrajectoryError& error, const EvaluateOptions& options,
       {{fmt::format("{} compared{}", plural(error.poses, "pose"), pairing), Table::Align::left},
        {"translation [m]", Table::Align::right},
        {"rotation [deg]", Table::Align::right}});
-  const auto row = [&](const char* name, double translation, double rotation) {
-    table.add({name, fmt::format("{:.6g}", translation), fmt::format("{:.6g}", rotation)});
+  const Figures figures(error);
+  const auto row = [&](const char* title, const std::string& name) {
+    table.add({title, figures.number(name + ".translation"), figures.number(name + ".rotation")});
   };
   row(options.scale ? "ATE (absolute, after alignment with scale)"
                     : "ATE (absolute, after rigid alignment)",
-      error.ate_translation, error.ate_rotation);
-  row("RPE (consecutive poses)", error.rpe_translation, error.rpe_rotation);
-  row("RPE all to all (every pair)", error.rpe_all_translation, error.rpe_all_rotation);
-  if (options.scale) table.add({"scale of the estimate", fmt::format("{:.6g}", error.scale), ""});
+      "ate");
+  row("RPE (consecutive poses)", "rpe");
+  row("RPE all to all (every pair)", "rpe_all");
+  if (options.scale) table.add({"scale of the estimate", figures["scale"], ""});
+  figures.add_rows(table);
   return table;
-}
-
-json::object error_json(double translation, double rotation) {
-  return {{"translation", translation}, {"rotation", rotation}};
 }
 
 json::object association_json(const EvaluateOptions& options, const Pairing& pairing) {
@@ -412,21 +444,8 @@ json::object association_json(const EvaluateOptions& options, const Pairing& pai
           {"largest_time_difference", pairing.pairs.largest_difference}};
 }
 
-/// As cairn sparsify reports it.
-void add_divergence(const GraphDivergence& divergence, const EvaluateOptions& options,
-                    json::object& report) {
-  report["kld"] = nullptr;
-  if (!divergence.error) return;
-  report["kld"] = divergence.error->kld;
-  report["kld_parts"] = {{"covariance", divergence.error->covariance},
-                         {"mean", divergence.error->mean}};
-  report["kld_of"] = {{"variables", divergence.variables},
-                      {"compared_at", options.compared_at},
-                      {"linear_solver", options.linear_solver}};
-}
-
 json::object report_json(const EvaluateOptions& options, const Pairing& pairing,
-                         const TrajectoryError& error) {
+                         const Evaluation& evaluation) {
   json::object report = begin_report("evaluate");
   report["estimate"] = options.estimate.file;
   report["truth"] = options.truth.file;
@@ -434,13 +453,13 @@ json::object report_json(const EvaluateOptions& options, const Pairing& pairing,
   report["axes"] = {{"estimate", options.estimate.axes}, {"truth", options.truth.axes}};
   report["planar"] = options.planar;
   report["alignment"] = options.scale ? "similarity" : "rigid";
-  report["scale"] = error.scale;
-  report["poses"] = {{"compared", error.poses},
-                     {"only_in_estimate", pairing.pairs.only_in_estimate},
-                     {"only_in_truth", pairing.pairs.only_in_truth}};
-  report["ate"] = error_json(error.ate_translation, error.ate_rotation);
-  report["rpe"] = error_json(error.rpe_translation, error.rpe_rotation);
-  report["rpe_all"] = error_json(error.rpe_all_translation, error.rpe_all_rotation);
+  if (options.kld) report["kld"] = nullptr;  // where it could not be computed
+  put(report, evaluation);
+  if (evaluation.divergence.error) {
+    report["kld_of"] = {{"variables", evaluation.divergence.variables},
+                        {"compared_at", options.compared_at},
+                        {"linear_solver", options.linear_solver}};
+  }
   return report;
 }
 
@@ -448,6 +467,7 @@ json::object report_json(const EvaluateOptions& options, const Pairing& pairing,
 
 int run(const EvaluateOptions& options, Session& session) {
   session.use_threads();
+  check_file(options.csv, session);
   check_file(options.latex, session);
   std::optional<CovarianceSolver> solver;  // a wrong name is reported before a file is read
   if (options.kld) {
@@ -488,12 +508,13 @@ int run(const EvaluateOptions& options, Session& session) {
     });
   }
   results.add([&] {
-    json::object report = report_json(options, pairing, error);
-    if (solver) add_divergence(divergence, options, report);
-    session.write_json(report);
+    session.write_json(report_json(options, pairing, {error, pairs, divergence}));
   });
   const Table errors = error_table(error, options, pairing.text),
               nats = divergence_table(divergence, options);
+  results.write(options.csv, [&] {
+    write_file(options.csv, Figures(Evaluation{error, pairs, divergence}).csv());
+  });
   results.write(options.latex, [&] {
     write_file(options.latex, errors.latex() + (nats.empty() ? "" : "\n" + nats.latex()));
   });

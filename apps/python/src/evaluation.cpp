@@ -12,6 +12,7 @@
 #include "bound_graph.hpp"
 #include "cairn/evaluation/trajectory.hpp"
 #include "cairn/runtime/error.hpp"
+#include "result_attributes.hpp"
 
 namespace cairn::python {
 namespace {
@@ -116,28 +117,16 @@ TrajectoryError evaluate(BoundGraph& estimate, BoundGraph& truth, const std::str
 }  // namespace
 
 void bind_evaluation(py::module_& module) {
-  py::class_<TrajectoryError>(module, "TrajectoryError",
-                              "Root mean squares of errors of an estimate against the truth.")
-      .def_readonly("poses", &TrajectoryError::poses, "How many were compared.")
-      .def_readonly(
-          "scale", &TrajectoryError::scale,
-          "By which the positions of the estimate were multiplied: 1 without align_scale.")
-      .def_readonly("ate_translation", &TrajectoryError::ate_translation,
-                    "Absolute, after alignment [m].")
-      .def_readonly("ate_rotation", &TrajectoryError::ate_rotation, "[deg]")
-      .def_readonly("rpe_translation", &TrajectoryError::rpe_translation,
-                    "Relative, between consecutive poses [m].")
-      .def_readonly("rpe_rotation", &TrajectoryError::rpe_rotation, "[deg]")
-      .def_readonly("rpe_all_translation", &TrajectoryError::rpe_all_translation,
-                    "Relative, over all pairs [m].")
-      .def_readonly("rpe_all_rotation", &TrajectoryError::rpe_all_rotation, "[deg]")
-      .def("__repr__", [](const TrajectoryError& error) {
-        return fmt::format(
-            "<cairn.TrajectoryError of {} poses: ATE {:.6g} m, {:.6g} deg; RPE {:.6g} "
-            "m, {:.6g} deg>",
-            error.poses, error.ate_translation, error.ate_rotation, error.rpe_translation,
-            error.rpe_rotation);
-      });
+  py::class_<TrajectoryError> type(module, "TrajectoryError",
+                                   "Root mean squares of errors of an estimate against the truth.");
+  type.def("__repr__", [](const TrajectoryError& error) {
+    return fmt::format(
+        "<cairn.TrajectoryError of {} poses: ATE {:.6g} m, {:.6g} deg; RPE {:.6g} "
+        "m, {:.6g} deg>",
+        error.poses, error.ate_translation, error.ate_rotation, error.rpe_translation,
+        error.rpe_rotation);
+  });
+  bind_fields<TrajectoryError>(type);
   module.def(
       "evaluate", &evaluate, py::arg("estimate"), py::arg("truth"), py::kw_only(),
       py::arg("match") = "auto", py::arg("planar") = false, py::arg("align_scale") = false,

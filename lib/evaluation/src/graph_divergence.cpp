@@ -19,6 +19,7 @@
 #include "cairn/linear/graph_marginals.hpp"
 #include "cairn/linear/normal_equations.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/result_fields.hpp"
 #include "conservative_margin.hpp"
 #include "dense/lu.hpp"
 #include "dense/products.hpp"
@@ -414,6 +415,21 @@ SparsificationError marginal_divergence(const Graph& p, const Graph& q, std::spa
   error.mean = divergence.mean;
   error.kld = divergence.total();
   return error;
+}
+
+ResultFields<SparsificationError> SparsificationError::fields() {
+  using E = SparsificationError;
+  return ResultFields<E>()
+      .figure("kld", &E::kld, "nats",
+              "divergence of the sparse graph from the original one, of the variables of both")
+      .figure("rmse", &E::rmse, "m", "by how much positions have moved")
+      .round("{:.3g}")
+      .figure("rmse_aligned", &E::rmse_aligned, "m", "the same after alignment")
+      .round("{:.3g}")
+      .figure("kld_parts.covariance", &E::covariance, "nats",
+              "the part of the divergence that is of covariances")
+      .figure("kld_parts.mean", &E::mean, "nats", "and that of means")
+      .details();
 }
 
 }  // namespace cairn

@@ -14,6 +14,7 @@
 
 #include "cairn/geometry/pose.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/result_fields.hpp"
 #include "cairn/runtime/threads.hpp"
 
 namespace cairn {
@@ -370,6 +371,34 @@ std::optional<CameraAxes> camera_axes_of_one(const TrajectoryPairs& pairs, doubl
 double absolute_error(const Trajectory& estimate, const Trajectory& truth) {
   const Pairs pairs = pairs_of(pair_by_id(estimate, truth));
   return std::sqrt(absolute_errors(pairs).translation / static_cast<double>(pairs.size()));
+}
+
+ResultFields<TrajectoryError> TrajectoryError::fields() {
+  using E = TrajectoryError;
+  return ResultFields<E>()
+      .figure("scale", &E::scale,
+              "by which the positions of the estimate were multiplied; 1 without align_scale")
+      .round("{:.6g}")
+      .figure("poses", &E::poses, "how many were compared")
+      .figure("ate.translation", &E::ate_translation, "m", "absolute, after alignment")
+      .round("{:.6g}")
+      .attribute("ate_translation")
+      .figure("ate.rotation", &E::ate_rotation, "deg", "absolute, after alignment")
+      .round("{:.6g}")
+      .attribute("ate_rotation")
+      .figure("rpe.translation", &E::rpe_translation, "m", "relative, between consecutive poses")
+      .round("{:.6g}")
+      .attribute("rpe_translation")
+      .figure("rpe.rotation", &E::rpe_rotation, "deg", "relative, between consecutive poses")
+      .round("{:.6g}")
+      .attribute("rpe_rotation")
+      .figure("rpe_all.translation", &E::rpe_all_translation, "m", "relative, over all pairs")
+      .round("{:.6g}")
+      .attribute("rpe_all_translation")
+      .figure("rpe_all.rotation", &E::rpe_all_rotation, "deg", "relative, over all pairs")
+      .round("{:.6g}")
+      .attribute("rpe_all_rotation")
+      .details();
 }
 
 }  // namespace cairn

@@ -6,6 +6,7 @@
 #include "cairn/graph/graph.hpp"
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/runtime/api.hpp"
+#include "cairn/runtime/result_fields_fwd.hpp"
 
 // (T n) is equation or section n of the thesis that sparsification.hpp names.
 
@@ -28,6 +29,8 @@ struct SparsificationError {
   double mean = 0.0;          ///< and that of the means: ½ (μ̆ − μ)ᵀ Λ̆ (μ̆ − μ)
   double rmse = 0.0;          ///< of positions [m]; NaN without positions
   double rmse_aligned = 0.0;  ///< the same after a rigid motion of the sparse graph [m]
+
+  CAIRN_API static ResultFields<SparsificationError> fields();
 };
 
 /// D(p‖q) = ½ (tr(Λ̆Σ) − ln |Λ̆Σ| + ‖μ̆ − μ‖²_Λ̆ − d), p the marginal of `original` on the nodes of

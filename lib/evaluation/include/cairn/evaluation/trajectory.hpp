@@ -11,6 +11,7 @@
 #include "cairn/geometry/pose.hpp"
 #include "cairn/graph/graph.hpp"
 #include "cairn/runtime/api.hpp"
+#include "cairn/runtime/result_fields_fwd.hpp"
 
 namespace cairn {
 
@@ -122,6 +123,8 @@ struct TrajectoryError {
   double rpe_rotation = 0.0;         ///< [deg]
   double rpe_all_translation = 0.0;  ///< relative, over all pairs [m]
   double rpe_all_rotation = 0.0;     ///< [deg]
+
+  CAIRN_API static ResultFields<TrajectoryError> fields();
 };
 
 /// The rigid motion (Kabsch, no scale) that brings the positions of the estimate nearest to those
