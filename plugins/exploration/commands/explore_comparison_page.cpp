@@ -94,12 +94,14 @@ std::string means_table(const ExploreComparison& comparison) {
   for (const std::string& explorer : comparison.explorers)
     text += fmt::format("<th>{}</th>", escaped(explorer));
   text += "</tr>\n";
-  for (const ExplorationMeasure& measure : exploration_measures()) {
+  const std::vector<ResultField>& measures = exploration_measures();
+  for (std::size_t k = 0; k < measures.size(); ++k) {
+    const ResultField& measure = measures[k];
     text += fmt::format(
         "<tr><td>{}{}</td>", escaped(measure.help),
         measure.unit.empty() ? std::string() : fmt::format(" [{}]", escaped(measure.unit)));
     for (std::size_t e = 0; e < comparison.explorers.size(); ++e) {
-      const MeanInterval mean = mean_interval(values_of(comparison.outcomes, e, measure));
+      const MeanInterval mean = mean_interval(values_of(comparison.outcomes, e, k));
       text += mean.count > 1 ? fmt::format("<td>{:.4g} ± {:.2g}</td>", mean.mean, mean.half_width)
               : mean.count == 1 ? fmt::format("<td>{:.4g}</td>", mean.mean)
                                 : std::string("<td>-</td>");

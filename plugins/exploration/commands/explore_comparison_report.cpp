@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <functional>
 #include <iterator>
 #include <limits>
@@ -12,6 +11,7 @@
 
 #include <fmt/format.h>
 
+#include "cairn/program/figures.hpp"
 #include "cairn/program/json_report.hpp"
 #include "cairn/program/table.hpp"
 #include "floors.hpp"
@@ -23,34 +23,20 @@ namespace json = boost::json;
 
 // Tables in the terminal --------------------------------------------------------------------------
 
-/// A row of the tables.
-struct Shown {
-  std::string_view measure, title;
-};
-constexpr auto kShown = std::to_array<Shown>({{"distance", "driven [m]"},
-                                              {"coverage", "coverage [m²]"},
-                                              {"seen", "of the floor seen [m²]"},
-                                              {"map_entropy", "map entropy [nats·m²]"},
-                                              {"trajectory_entropy", "trajectory entropy [nats]"},
-                                              {"map_error", "map error [m²]"},
-                                              {"wrong", "wrong cells [m²]"},
-                                              {"ate", "ATE [m]"},
-                                              {"loops", "loop closures"},
-                                              {"collisions", "collisions"},
-                                              {"seconds", "time [s]"},
-                                              {"decision_p95", "95 % of decisions [s]"}});
-
-const ExplorationMeasure& measure_named(std::string_view name) {
-  return *std::ranges::find(exploration_measures(), name, &ExplorationMeasure::name);
+/// The measures that have a row, with their titles.
+void for_shown(const std::function<void(const std::string& title, std::size_t measure)>& use) {
+  const std::vector<ResultField>& measures = exploration_measures();
+  for (std::size_t k = 0; k < measures.size(); ++k)
+    if (!measures[k].is_detail) use(title_of(measures[k]), k);
 }
 
 MeanInterval mean_of(const ExploreComparison& comparison, std::size_t explorer,
-                     const ExplorationMeasure& measure) {
+                     std::size_t measure) {
   return mean_interval(values_of(comparison.outcomes, explorer, measure));
 }
 
 MeanInterval difference_of(const ExploreComparison& comparison, std::size_t explorer,
-                           const ExplorationMeasure& measure) {
+                           std::size_t measure) {
   return paired_difference(values_of(comparison.outcomes, explorer, measure),
                            values_of(comparison.outcomes, 0, measure));
 }
@@ -79,11 +65,10 @@ Table means_table(const ExploreComparison& comparison) {
                          return run.explorer == e && run.done;
                        }));
   });
-  for (const Shown& shown : kShown) {
-    add_row(table, comparison, 0, shown.title, [&](std::size_t e) {
-      return interval_text(mean_of(comparison, e, measure_named(shown.measure)));
-    });
-  }
+  for_shown([&](const std::string& title, std::size_t measure) {
+    add_row(table, comparison, 0, title,
+            [&](std::size_t e) { return interval_text(mean_of(comparison, e, measure)); });
+  });
   return table;
 }
 
@@ -94,11 +79,10 @@ std::string difference_text(const MeanInterval& difference) {
 
 Table differences_table(const ExploreComparison& comparison) {
   Table table = table_of(comparison, 1);
-  for (const Shown& shown : kShown) {
-    add_row(table, comparison, 1, shown.title, [&](std::size_t e) {
-      return difference_text(difference_of(comparison, e, measure_named(shown.measure)));
-    });
-  }
+  for_shown([&](const std::string& title, std::size_t measure) {
+    add_row(table, comparison, 1, title,
+            [&](std::size_t e) { return difference_text(difference_of(comparison, e, measure)); });
+  });
   const auto add_map_error = [&](const char* title, MapQuality quality) {
     add_row(table, comparison, 1, title, [&](std::size_t e) {
       return difference_text(difference_at_equal_coverage(comparison.outcomes, e, 0, quality));
@@ -137,6 +121,27 @@ std::string ends_text(const ExploreComparison& comparison) {
   return text;
 }
 
+/// A run in the table of `--csv`.
+struct RunRow {
+  const std::string& explorer;
+  const ComparedRun& run;
+
+  static ResultFields<RunRow> fields() {
+    using R = RunRow;
+    return ResultFields<R>()
+        .figure(
+            "explorer", [](const R& r) { return r.explorer; }, "as it was named")
+        .figure(
+            "seed", [](const R& r) { return r.run.seed; }, "of the run")
+        .figure(
+            "end", [](const R& r) { return r.run.done ? to_string(r.run.end) : "failed"; },
+            "how it ended")
+        .figure(
+            "why", [](const R& r) { return r.run.why; }, "a sentence")
+        .part([](const R& r) { return r.run.done ? &r.run.measures : nullptr; });
+  }
+};
+
 // JSON --------------------------------------------------------------------------------------------
 
 json::object interval_json(const MeanInterval& interval) {
@@ -149,10 +154,11 @@ json::object interval_json(const MeanInterval& interval) {
 
 /// {"measures": …, "measured_seconds": …} of intervals.
 void put_intervals(json::object& report,
-                   const std::function<MeanInterval(const ExplorationMeasure&)>& of) {
+                   const std::function<MeanInterval(std::size_t measure)>& of) {
   json::object numbers, seconds;
-  for (const ExplorationMeasure& measure : exploration_measures())
-    (measure.is_time ? seconds : numbers)[measure.name] = interval_json(of(measure));
+  const std::vector<ResultField>& measures = exploration_measures();
+  for (std::size_t k = 0; k < measures.size(); ++k)
+    (is_time(measures[k]) ? seconds : numbers)[measures[k].name] = interval_json(of(k));
   report["measures"] = std::move(numbers);
   report["measured_seconds"] = std::move(seconds);
 }
@@ -162,11 +168,11 @@ json::object explorer_json(const ExploreComparison& comparison, std::size_t e) {
   json::object ends;
   for (const auto& [end, count] : ends_of(comparison, e)) ends[end] = count;
   report["ends"] = std::move(ends);
-  put_intervals(report, [&](const auto& measure) { return mean_of(comparison, e, measure); });
+  put_intervals(report, [&](std::size_t measure) { return mean_of(comparison, e, measure); });
   if (e == 0) return report;
   json::object difference;
   put_intervals(difference,
-                [&](const auto& measure) { return difference_of(comparison, e, measure); });
+                [&](std::size_t measure) { return difference_of(comparison, e, measure); });
   difference["map_error_at_equal_coverage"] = interval_json(
       difference_at_equal_coverage(comparison.outcomes, e, 0, MapQuality::contradicted));
   difference["wrong_at_equal_seen"] =
@@ -300,20 +306,10 @@ std::string comparison_latex(const ExploreComparison& comparison) {
 }
 
 std::string comparison_csv(const ExploreComparison& comparison) {
-  std::string text = "explorer,seed,end,why";
-  for (const ExplorationMeasure& measure : exploration_measures())
-    text += fmt::format(",{}", measure.name);
-  text += "\n";
-  for (const ComparedRun& run : comparison.outcomes) {
-    text += fmt::format("{},{},{},{}", csv_field(comparison.explorers[run.explorer]), run.seed,
-                        run.done ? to_string(run.end) : "failed", csv_field(run.why));
-    for (const ExplorationMeasure& measure : exploration_measures()) {
-      const double value = run.measures.*measure.member;
-      text += run.done && std::isfinite(value) ? fmt::format(",{:.9g}", value) : ",";
-    }
-    text += "\n";
-  }
-  return text;
+  CsvText csv(result_fields<RunRow>().all());
+  for (const ComparedRun& run : comparison.outcomes)
+    csv.add(result_record(RunRow{comparison.explorers[run.explorer], run}));
+  return csv.text();
 }
 
 json::object comparison_json(const ExploreComparison& comparison) {

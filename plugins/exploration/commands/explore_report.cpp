@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "cairn/evaluation/trajectory.hpp"
+#include "cairn/program/figures.hpp"
 #include "cairn/program/json_report.hpp"
 #include "cairn/program/table.hpp"
 #include "floors.hpp"
@@ -72,25 +73,13 @@ json::object map_json(const ExplorationResult& result) {
   return map;
 }
 
-json::array steps_json(const ExplorationResult& result) {
-  json::array steps;
-  for (const ExplorationStep& step : result.steps) {
-    steps.push_back({{"distance", step.distance},
-                     {"coverage", step.coverage},
-                     {"map_entropy", step.map_entropy},
-                     {"trajectory_entropy", number_json(step.trajectory_entropy)},
-                     {"loops", step.loops}});
-  }
-  return steps;
-}
-
 }  // namespace
 
 void put_measures(json::object& report, const ExplorationMeasures& measures) {
   json::object numbers, seconds;
-  for (const ExplorationMeasure& measure : exploration_measures()) {
-    (measure.is_time ? seconds : numbers)[measure.name] = number_json(measures.*measure.member);
-  }
+  const std::vector<ResultField>& fields = exploration_measures();
+  for (std::size_t k = 0; k < fields.size(); ++k)
+    (is_time(fields[k]) ? seconds : numbers)[fields[k].name] = number_json(value_of(measures, k));
   report["measures"] = std::move(numbers);
   report["measured_seconds"] = std::move(seconds);
 }
@@ -134,25 +123,12 @@ json::object report_json(const ExploreOutcome& outcome) {
   put_measures(report, measures_of(result, static_cast<double>(outcome.frame.size()) *
                                                outcome.frame.cell_area()));
   report["notes"] = strings_json(result.notes);
-  report["steps"] = steps_json(result);
+  report["steps"] = to_json(result.steps);
   return report;
 }
 
 std::string steps_csv(const ExplorationResult& result) {
-  std::string text =
-      "step,decision,distance,x,y,theta,true_x,true_y,true_theta,coverage,map_entropy,"
-      "grid_area,trajectory_entropy,kept,loops,collisions\n";
-  for (const ExplorationStep& step : result.steps) {
-    const std::string truth = step.truth ? fmt::format("{:.9g},{:.9g},{:.9g}", step.truth->x(),
-                                                       step.truth->y(), step.truth->theta())
-                                         : ",,";
-    text +=
-        fmt::format("{},{},{:.9g},{:.9g},{:.9g},{:.9g},{},{:.9g},{:.9g},{:.9g},{:.9g},{},{},{}\n",
-                    step.step, step.decision, step.distance, step.estimate.x(), step.estimate.y(),
-                    step.estimate.theta(), truth, step.coverage, step.map_entropy, step.grid_area,
-                    step.trajectory_entropy, step.kept, step.loops, step.collisions);
-  }
-  return text;
+  return csv_of<ExplorationStep>(result.steps);
 }
 
 std::string summary_text(const ExploreOutcome& outcome) {

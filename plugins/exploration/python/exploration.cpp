@@ -31,6 +31,7 @@
 #include "follower.hpp"
 #include "interrupt.hpp"
 #include "python_explorer.hpp"
+#include "result_attributes.hpp"
 
 namespace cairn::python {
 namespace {
@@ -166,11 +167,19 @@ std::unique_ptr<BoundExploration> explore(
 
 // Arrays ------------------------------------------------------------------------------------------
 
-template <class Get>
-py::array column(const std::vector<ExplorationStep>& steps, const Get& get) {
-  using Number = decltype(get(steps.front()));
+template <class Number>
+py::array column(const std::vector<ExplorationStep>& steps, std::size_t field) {
+  const detail::ResultFieldList& fields = result_fields<ExplorationStep>().list();
   py::array_t<Number> numbers(static_cast<py::ssize_t>(steps.size()));
-  for (std::size_t k = 0; k < steps.size(); ++k) numbers.mutable_data()[k] = get(steps[k]);
+  for (std::size_t k = 0; k < steps.size(); ++k) {
+    numbers.mutable_data()[k] = std::visit(
+        [](const auto& value) -> Number {
+          if constexpr (std::is_arithmetic_v<std::remove_cvref_t<decltype(value)>>)
+            return static_cast<Number>(value);
+          return Number();
+        },
+        fields.value(field, &steps[k]).data);
+  }
   return numbers;
 }
 
@@ -184,59 +193,41 @@ py::array_t<double> poses(const std::vector<ExplorationStep>& steps, const Get& 
   return array_of(numbers, {steps.size(), 3});
 }
 
-/// A column for each member of a step.
+/// A column for each field of a step; of poses one for all three.
 py::dict steps_of(const BoundExploration& bound) {
   using Step = ExplorationStep;
   const std::vector<Step>& steps = bound.result.steps;
   const double nan = std::nan("");
   py::dict all;
-  all["step"] = column(steps, [](const Step& s) { return s.step; });
-  all["decision"] = column(steps, [](const Step& s) { return s.decision; });
-  all["distance"] = column(steps, [](const Step& s) { return s.distance; });
-  all["estimate"] = poses(steps, [](const Step& s) { return s.estimate; });
-  all["truth"] =
-      poses(steps, [&](const Step& s) { return s.truth.value_or(Pose2(nan, nan, nan)); });
-  all["coverage"] = column(steps, [](const Step& s) { return s.coverage; });
-  all["map_entropy"] = column(steps, [](const Step& s) { return s.map_entropy; });
-  all["grid_area"] = column(steps, [](const Step& s) { return s.grid_area; });
-  all["trajectory_entropy"] = column(steps, [](const Step& s) { return s.trajectory_entropy; });
-  all["kept"] = column(steps, [](const Step& s) { return s.kept; });
-  all["loops"] = column(steps, [](const Step& s) { return s.loops; });
-  all["collisions"] = column(steps, [](const Step& s) { return s.collisions; });
-  return all;
-}
-
-py::dict measures(const BoundExploration& bound) {
-  py::dict all;
-  for (const ExplorationMeasure& measure : exploration_measures())
-    all[py::str(std::string(measure.name))] = bound.measures.*measure.member;
+  const std::vector<ResultField>& fields = result_fields<Step>().all();
+  for (std::size_t k = 0; k < fields.size(); ++k) {
+    const py::str name(fields[k].name.substr(0, fields[k].name.find('.')));
+    if (fields[k].name == "estimate.x") {
+      all[name] = poses(steps, [](const Step& s) { return s.estimate; });
+    } else if (fields[k].name == "truth.x") {
+      all[name] =
+          poses(steps, [&](const Step& s) { return s.truth.value_or(Pose2(nan, nan, nan)); });
+    } else if (!all.contains(name)) {
+      all[name] =
+          fields[k].type == ResultType::integer ? column<int>(steps, k) : column<double>(steps, k);
+    }
+  }
   return all;
 }
 
 void bind_step(py::module_& module) {
   using Step = ExplorationStep;
-  py::class_<Step>(module, "ExplorationStep", "A run after one motion.")
-      .def_readonly("step", &Step::step, "How many motions there were.")
-      .def_readonly("decision", &Step::decision, "How many decisions there were.")
-      .def_readonly("distance", &Step::distance,
-                    "Driven so far [m]: as it truly was, else by odometry.")
-      .def_readonly("estimate", &Step::estimate, "Where the robot is, as estimated: a Pose2.")
+  py::class_<Step> type(module, "ExplorationStep", "A run after one motion.");
+  type.def_readonly("estimate", &Step::estimate, "Where the robot is, as estimated: a Pose2.")
       .def_readonly(
           "truth", &Step::truth,
           "Where it truly is, in the frame of the estimate, where both begin at one pose: a Pose2; "
           "None: that is not known.")
-      .def_readonly("coverage", &Step::coverage, "Of the cells that are known [m^2].")
-      .def_readonly("map_entropy", &Step::map_entropy,
-                    "Over the floor's grid or, where that is not known, the map's [nats m^2].")
-      .def_readonly("grid_area", &Step::grid_area, "Of that grid, known or not [m^2].")
-      .def_readonly("trajectory_entropy", &Step::trajectory_entropy, "[nats]")
-      .def_readonly("kept", &Step::kept, "Poses that are kept.")
-      .def_readonly("loops", &Step::loops, "Loop closures in the graph.")
-      .def_readonly("collisions", &Step::collisions)
       .def("__repr__", [](const Step& step) {
         return fmt::format("<cairn.ExplorationStep {}: {:.1f} m driven, {:.1f} m^2 known>",
                            step.step, step.distance, step.coverage);
       });
+  bind_fields<Step>(type);
 }
 
 void bind_result(py::module_& module) {
@@ -269,10 +260,11 @@ void bind_result(py::module_& module) {
           "known.")
       .def_property_readonly(
           "map", [](const Bound& b) { return b.result.map.occupancy(); }, "The map: a Floor.")
-      .def_property_readonly("measures", &measures,
-                             "The numbers by which runs are compared (docs/explore.md), by name: "
-                             "coverage [m^2], map_error [m^2], ate [m], seconds [s], …; NaN: not "
-                             "known.")
+      .def_property_readonly(
+          "measures", [](const Bound& b) { return dict_of(result_record(b.measures)); },
+          "The numbers by which runs are compared (docs/explore.md), by name: "
+          "coverage [m^2], map_error [m^2], ate [m], seconds [s], …; NaN: not "
+          "known.")
       .def_property_readonly(
           "decision_seconds", [](const Bound& b) { return array_of(b.result.decision_seconds); },
           "Of each decision [s]: (n,).")

@@ -17,7 +17,7 @@ namespace {
 
 TEST(ExplorationMeasures, HaveNamesOfTheirOwn) {
   std::set<std::string_view> names;
-  for (const ExplorationMeasure& measure : exploration_measures())
+  for (const ResultField& measure : exploration_measures())
     EXPECT_TRUE(names.insert(measure.name).second) << measure.name;
   EXPECT_EQ(names.size() * sizeof(double), sizeof(ExplorationMeasures));
 }
@@ -71,7 +71,7 @@ TEST(DifferenceAtEqualCoverage, IsTakenWhereBothRunsHaveBeen) {
   std::vector<ComparedRun> fewer = runs;
   fewer[3].done = false;
   EXPECT_EQ(difference_at_equal_coverage(fewer, 1, 0, MapQuality::contradicted).count, 1);
-  EXPECT_TRUE(std::isnan(values_of(fewer, 1, exploration_measures()[3])[1]));
+  EXPECT_TRUE(std::isnan(values_of(fewer, 1, 3)[1]));
 }
 
 TEST(OverDistance, MapEntropyIsThatOfTheFloorsGrid) {

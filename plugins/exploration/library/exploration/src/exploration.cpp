@@ -23,6 +23,7 @@
 #include "cairn/grid/cell_traversal.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
+#include "cairn/runtime/result_fields.hpp"
 #include "cairn/runtime/timed.hpp"
 #include "end_notes.hpp"
 
@@ -637,5 +638,45 @@ std::string_view to_string(ExplorationEnd end) {
 }
 
 ExplorationResult run_exploration(const Exploration& parts) { return Run(parts).run(); }
+
+ResultFields<ExplorationStep> ExplorationStep::fields() {
+  using S = ExplorationStep;
+  const auto true_pose = [](auto coordinate) {
+    return [coordinate](const S& s) -> std::optional<double> {
+      if (!s.truth) return std::nullopt;
+      return std::invoke(coordinate, *s.truth);
+    };
+  };
+  return ResultFields<S>()
+      .figure("step", &S::step, "how many motions there were")
+      .figure("decision", &S::decision, "how many decisions there were")
+      .figure("distance", &S::distance, "m", "driven so far: as it truly was, else by odometry")
+      .figure(
+          "estimate.x", [](const S& s) { return s.estimate.x(); }, "m",
+          "where the robot is, as estimated")
+      .column("x")
+      .figure(
+          "estimate.y", [](const S& s) { return s.estimate.y(); }, "m",
+          "where the robot is, as estimated")
+      .column("y")
+      .figure(
+          "estimate.theta", [](const S& s) { return s.estimate.theta(); }, "rad",
+          "its heading, as estimated")
+      .column("theta")
+      .figure("truth.x", true_pose(&Pose2::x), "m", "where it truly is, in the same frame")
+      .column("true_x")
+      .figure("truth.y", true_pose(&Pose2::y), "m", "where it truly is, in the same frame")
+      .column("true_y")
+      .figure("truth.theta", true_pose(&Pose2::theta), "rad", "its true heading")
+      .column("true_theta")
+      .figure("coverage", &S::coverage, "m²", "of the cells that are known")
+      .figure("map_entropy", &S::map_entropy, "nats·m²",
+              "over the floor's grid or, where that is not known, the map's")
+      .figure("grid_area", &S::grid_area, "m²", "of that grid, known or not")
+      .figure("trajectory_entropy", &S::trajectory_entropy, "nats", "of the trajectory (5.13)")
+      .figure("kept", &S::kept, "poses that are kept")
+      .figure("loops", &S::loops, "loop closures in the graph")
+      .figure("collisions", &S::collisions, "collisions so far");
+}
 
 }  // namespace cairn

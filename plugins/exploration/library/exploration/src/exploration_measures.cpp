@@ -2,43 +2,70 @@
 #include "cairn/exploration/exploration_measures.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <variant>
 #include <vector>
 
 #include "cairn/evaluation/trajectory.hpp"
 
 namespace cairn {
 
-std::span<const ExplorationMeasure> exploration_measures() {
+ResultFields<ExplorationMeasures> ExplorationMeasures::fields() {
   using M = ExplorationMeasures;
-  static constexpr std::array kAll = std::to_array<ExplorationMeasure>(
-      {{"distance", "m", "driven", &M::distance},
-       {"motions", "", "motions", &M::motions},
-       {"decisions", "", "decisions", &M::decisions},
-       {"coverage", "m²", "area of the cells that are known", &M::coverage},
-       {"seen", "m²", "of the true floor around the start, what is known", &M::seen},
-       {"reachable_seen", "", "part of what the body can cover that is known", &M::reachable_seen},
-       {"map_entropy", "nats·m²", "(5.6) over the floor's grid", &M::map_entropy},
-       {"trajectory_entropy", "nats", "(5.13)", &M::trajectory_entropy},
-       {"map_error", "m²", "cells that contradict a scan", &M::map_error},
-       {"wrong", "m²", "cells that are wrong beside the floor", &M::wrong},
-       {"loops", "", "loop closures", &M::loops},
-       {"poses", "", "poses that are kept", &M::poses},
-       {"collisions", "", "collisions", &M::collisions},
-       {"ate", "m", "absolute trajectory error", &M::ate},
-       {"ate_rotation", "deg", "its rotation", &M::ate_rotation},
-       {"expected_ate", "m", "the error that the covariances predict", &M::expected_ate},
-       {"seconds", "s", "of the run, without mapping and simulation", &M::seconds, true},
-       {"map_seconds", "s", "of mapping", &M::map_seconds, true},
-       {"decide_seconds", "s", "of all decisions", &M::decide_seconds, true},
-       {"decision_median", "s", "of a decision, median", &M::decision_median, true},
-       {"decision_p95", "s", "that 95 % of the decisions do not exceed", &M::decision_p95, true},
-       {"decision_max", "s", "of the longest decision", &M::decision_max, true}});
-  return kAll;
+  return ResultFields<M>()
+      .figure("distance", &M::distance, "m", "driven")
+      .label("driven")
+      .figure("motions", &M::motions, "motions")
+      .detail()
+      .figure("decisions", &M::decisions, "decisions")
+      .detail()
+      .figure("coverage", &M::coverage, "m²", "area of the cells that are known")
+      .figure("seen", &M::seen, "m²", "of the true floor around the start, what is known")
+      .label("of the floor seen")
+      .figure("reachable_seen", &M::reachable_seen, "part of what the body can cover that is known")
+      .detail()
+      .figure("map_entropy", &M::map_entropy, "nats·m²", "(5.6) over the floor's grid")
+      .figure("trajectory_entropy", &M::trajectory_entropy, "nats", "(5.13)")
+      .figure("map_error", &M::map_error, "m²", "cells that contradict a scan")
+      .figure("wrong", &M::wrong, "m²", "cells that are wrong beside the floor")
+      .label("wrong cells")
+      .figure("loops", &M::loops, "loop closures")
+      .label("loop closures")
+      .figure("poses", &M::poses, "poses that are kept")
+      .detail()
+      .figure("collisions", &M::collisions, "collisions")
+      .figure("ate", &M::ate, "m", "absolute trajectory error")
+      .label("ATE")
+      .figure("ate_rotation", &M::ate_rotation, "deg", "its rotation")
+      .detail()
+      .figure("expected_ate", &M::expected_ate, "m", "the error that the covariances predict")
+      .detail()
+      .figure("seconds", &M::seconds, "s", "of the run, without mapping and simulation")
+      .label("time")
+      .figure("map_seconds", &M::map_seconds, "s", "of mapping")
+      .detail()
+      .figure("decide_seconds", &M::decide_seconds, "s", "of all decisions")
+      .detail()
+      .figure("decision_median", &M::decision_median, "s", "of a decision, median")
+      .detail()
+      .figure("decision_p95", &M::decision_p95, "s", "that 95 % of the decisions do not exceed")
+      .label("95 % of decisions")
+      .figure("decision_max", &M::decision_max, "s", "of the longest decision")
+      .detail();
 }
+
+const std::vector<ResultField>& exploration_measures() {
+  return result_fields<ExplorationMeasures>().all();
+}
+
+double value_of(const ExplorationMeasures& measures, std::size_t measure) {
+  return std::get<double>(
+      result_fields<ExplorationMeasures>().list().value(measure, &measures).data);
+}
+
+bool is_time(const ResultField& measure) { return measure.unit == "s"; }
 
 double entropy_of_area(double entropy, double grid_area, double area) {
   return entropy + std::numbers::ln2 * (area - grid_area);

@@ -175,11 +175,11 @@ std::vector<ComparedRun> compare_explorers(const ExplorerComparison& comparison,
 }
 
 std::vector<double> values_of(std::span<const ComparedRun> runs, std::size_t explorer,
-                              const ExplorationMeasure& measure) {
+                              std::size_t measure) {
   std::vector<double> values;
   for (const ComparedRun& run : runs) {
     if (run.explorer == explorer)
-      values.push_back(run.done ? run.measures.*measure.member : kUnknown);
+      values.push_back(run.done ? value_of(run.measures, measure) : kUnknown);
   }
   return values;
 }

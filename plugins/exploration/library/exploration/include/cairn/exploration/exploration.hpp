@@ -22,6 +22,7 @@
 #include "cairn/policy/pose_policy.hpp"
 #include "cairn/policy/registration.hpp"
 #include "cairn/runtime/api.hpp"
+#include "cairn/runtime/result_fields_fwd.hpp"
 #include "cairn/types/loss.hpp"
 
 namespace cairn {
@@ -59,6 +60,8 @@ struct ExplorationStep {
   double grid_area = 0.0;           ///< of the floor's grid; if not known, of the map's [m²]
   double trajectory_entropy = 0.0;  ///< (5.13): see `trajectory_entropy` [nats]
   int kept = 0, loops = 0, collisions = 0;
+
+  CAIRN_API static ResultFields<ExplorationStep> fields();
 };
 
 /// How good the map is at some point of a run.

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <span>
-#include <string_view>
+#include <vector>
 
 #include "cairn/exploration/exploration.hpp"
 #include "cairn/runtime/api.hpp"
+#include "cairn/runtime/result_fields.hpp"
 
 namespace cairn {
 
@@ -35,19 +37,16 @@ struct ExplorationMeasures {
   double decision_median = 0.0;  ///< of one decision [s]
   double decision_p95 = 0.0;     ///< that 95 % of the decisions do not exceed [s]
   double decision_max = 0.0;     ///< of the longest [s]
+
+  CAIRN_API static ResultFields<ExplorationMeasures> fields();
 };
 
-/// One of them, by name.
-struct ExplorationMeasure {
-  std::string_view name;  ///< that of the member
-  std::string_view unit;  ///< "m²", or empty for a number
-  std::string_view help;
-  double ExplorationMeasures::*member;
-  bool is_time = false;  ///< of the clock: differs between runs that are otherwise the same
-};
-
-/// All of them, in the order of the struct.
-CAIRN_API std::span<const ExplorationMeasure> exploration_measures();
+/// What a measure is called, its unit and what it is, in the order of the struct.
+CAIRN_API const std::vector<ResultField>& exploration_measures();
+/// One of them. Precondition: `measure` is below how many there are.
+CAIRN_API double value_of(const ExplorationMeasures& measures, std::size_t measure);
+/// Whether it is of the clock, which differs between runs that are otherwise the same.
+CAIRN_API bool is_time(const ResultField& measure);
 
 /// (5.6) of a grid of `area` [m²], from the entropy of a smaller or larger one: cells that are
 /// unknown have ln 2 nats each.

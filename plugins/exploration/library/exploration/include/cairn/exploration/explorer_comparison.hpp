@@ -102,9 +102,10 @@ CAIRN_API std::vector<ComparedRun> compare_explorers(
 
 // What the runs say -------------------------------------------------------------------------------
 
-/// A measure of the runs of one explorer, by seed; NaN of runs that are not done.
+/// A measure of the runs of one explorer, by seed; NaN of runs that are not done. By its place
+/// among `exploration_measures`.
 CAIRN_API std::vector<double> values_of(std::span<const ComparedRun> runs, std::size_t explorer,
-                                        const ExplorationMeasure& measure);
+                                        std::size_t measure);
 
 /// What maps are compared by at equal coverage.
 enum class MapQuality {
