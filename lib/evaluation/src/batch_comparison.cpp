@@ -12,6 +12,7 @@
 #include "cairn/linear/graph_marginals.hpp"
 #include "cairn/linear/marginals.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/result_fields.hpp"
 
 namespace cairn {
 namespace {
@@ -88,6 +89,24 @@ double BatchChecker::covariance_difference(Estimator& estimator, const Graph& gr
     next += n * n;
   }
   return largest;
+}
+
+ResultFields<BatchCheck> BatchCheck::fields() {
+  using C = BatchCheck;
+  return ResultFields<C>()
+      .figure("step", &C::step, "from 1")
+      .figure("chi2", &C::chi2, "of the estimator")
+      .round("{:.8g}")
+      .figure("batch", &C::batch, "of an optimisation from the initial estimate")
+      .round("{:.8g}")
+      .figure("polished", &C::polished, "of an optimisation from the estimator's estimate")
+      .round("{:.8g}")
+      .figure("excess", &C::excess, "how far chi2 is above the lower of these, relative to it")
+      .round("{:.3g}")
+      .figure("covariance_difference", &C::covariance_difference,
+              "largest relative difference of a covariance from the exact one")
+      .round("{:.2g}")
+      .optional();
 }
 
 }  // namespace cairn

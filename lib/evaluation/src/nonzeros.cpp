@@ -3,6 +3,7 @@
 
 #include "cairn/linear/linearizer.hpp"
 #include "cairn/linear/normal_equations.hpp"
+#include "cairn/runtime/result_fields.hpp"
 
 namespace cairn {
 
@@ -14,6 +15,13 @@ Nonzeros count_nonzeros(const Graph& graph, LinearSolver& solver) {
   Nonzeros result{2 * structure.values(), solver.stats().factor_nonzeros};
   for (const std::int64_t size : structure.sizes()) result.information -= size * size;
   return result;
+}
+
+ResultFields<Nonzeros> Nonzeros::fields() {
+  return ResultFields<Nonzeros>()
+      .figure("information", &Nonzeros::information, "numbers in the blocks of H, both triangles")
+      .figure("factor", &Nonzeros::factor, "numbers in its factor; 0: not known")
+      .details();
 }
 
 }  // namespace cairn

@@ -14,6 +14,7 @@
 #include "cairn/geometry/state_group.hpp"
 #include "cairn/linear/linearizer.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/result_fields.hpp"
 #include "dense/products.hpp"
 
 namespace cairn {
@@ -145,6 +146,14 @@ std::vector<Id> evenly_spread(std::span<const Id> ids) {
   const std::size_t count = std::min(kMost, ids.size());
   for (std::size_t k = 1; k <= count; ++k) some.push_back(ids[k * ids.size() / count - 1]);
   return some;
+}
+
+ResultFields<NormalizedError> NormalizedError::fields() {
+  using E = NormalizedError;
+  return ResultFields<E>()
+      .figure("squared", &E::squared, "e^T Sigma^-1 e, its mean being dof where Sigma is right")
+      .figure("dof", &E::dof, "degrees of freedom")
+      .details();
 }
 
 }  // namespace cairn

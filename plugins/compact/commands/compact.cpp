@@ -269,6 +269,7 @@ void check(const CompactOptions& options, Session& session) {
   check_file(options.steps, session);
   check_file(options.compare, session);
   check_file(options.save_thresholds, session);
+  options.figures.check(session);
   if (!options.compare.empty() && !options.map.empty()) {
     throw Error(ErrorCode::usage,
                 "--compare is with all measurements of a recording, which a map of an earlier "
@@ -326,11 +327,11 @@ void note_advice(const SelectionCheck::Advice& advice, const CompactOptions& opt
 
 /// A map that is far from that of all measurements has lost more than its covariances say.
 void note_distance(const CompactOutcome& outcome, const Session& session) {
-  if (outcome.made.whole || !outcome.check || !outcome.check->is_far()) return;
+  if (outcome.made.whole || !outcome.made.check || !outcome.made.check->is_far()) return;
   session.note(fmt::format(
       "the map is {}: --strategy whole keeps as few poses with the estimate of all measurements, "
       "a lower --loop-gain uses more loop closures",
-      outcome.check->to_string()));
+      outcome.made.check->to_string()));
 }
 
 }  // namespace
@@ -414,11 +415,10 @@ int run_compact(const CompactOptions& options, Session& session) {
     if (recording.map) run.load(*recording.map);
     run.run(recording.data.poses.size(), "random_poses");
     progress.clear();
-    outcome.control = run.finish(job.compaction.recovery);
+    outcome.like = std::exchange(outcome.made.result, run.finish(job.compaction.recovery));
+    outcome.made.check = check_map(outcome.made.job, outcome.made.result, setting);
   }
-  const PolicyResult& shown = outcome.shown();
-  outcome.check =
-      outcome.control ? check_map(outcome.made.job, shown, setting) : outcome.made.check;
+  const PolicyResult& shown = outcome.made.result;
   results.write(options.output, [&] {
     write_graph(shown.compact, options.output, registry,
                 output_format(options.output, options.output_format));
@@ -431,14 +431,19 @@ int run_compact(const CompactOptions& options, Session& session) {
   });
   results.write(options.steps, [&] { write_file(options.steps, steps_csv(shown)); });
   results.write(options.compare,
-                [&] { write_file(options.compare, comparison_csv(comparison->steps())); });
+                [&] { write_file(options.compare, csv_of<UncertaintyStep>(comparison->steps())); });
   results.add([&] {
     boost::json::object report = report_json(options, outcome);
-    if (comparison) report["compare"] = comparison_json(comparison->steps());
+    if (comparison) {
+      boost::json::object& compared = report["compare"].emplace_object();
+      compared["steps"] = comparison->steps().size();
+      put(compared, conservativeness(comparison->steps()));
+    }
     session.write_json(report);
   });
+  options.figures.write(Figures(outcome.made), results);
   note_defaults(options, outcome, session);
-  if (!outcome.control) {
+  if (!outcome.like) {
     for (const SelectionCheck::Advice& advice : outcome.made.advice)
       note_advice(advice, options, outcome, session);
   }
@@ -530,6 +535,7 @@ OptionFields<CompactOptions> CompactOptions::fields(std::vector<std::string> str
       .placeholder("FILE")
       .text("steps", &O::steps, "a row for each pose, as CSV")
       .placeholder("FILE")
+      .part(&O::figures)
       .part(&O::problem, ProblemOptions::loss_fields())
       .part(&O::input);
 }

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "cairn/program/figure_files.hpp"
 #include "cairn/program/graph_files.hpp"
 #include "cairn/program/problem_setup.hpp"
 #include "cairn/program/session.hpp"
@@ -30,6 +31,7 @@ struct CompactOptions {
   int keep = 0;  ///< most poses; 0: any number
   std::optional<double> range, angle, loop_gain, pose_gain, gate;
   std::string steps;
+  FigureFiles figures;
   InputOptions input;
   ProblemOptions problem;
   // Of studies, besides the strategy rfpfl:

@@ -3,7 +3,6 @@
 
 #include <optional>
 #include <string>
-#include <vector>
 
 #include <boost/json/fwd.hpp>
 
@@ -20,12 +19,9 @@ struct CompactOutcome {
   const std::string& name;  ///< of the graph
   const PolicyData& data;
   const UsedThresholds& thresholds;  ///< of the run, whatever was found
-  Compaction made;
-  std::optional<PolicyResult> control = {};  ///< as many poses and loops at random
-  std::optional<MapCheck> check = {};        ///< of what is shown
-
-  /// What is written and shown.
-  const PolicyResult& shown() const { return control ? *control : made.result; }
+  Compaction made;                   ///< what is written and shown
+  /// Where that is a control, as many poses and loops at random: what it is like.
+  std::optional<PolicyResult> like = {};
 };
 
 boost::json::object report_json(const CompactOptions& options, const CompactOutcome& outcome);
@@ -34,8 +30,5 @@ std::string summary_text(const CompactOptions& options, const CompactOutcome& ou
 
 /// A row for each pose.
 std::string steps_csv(const PolicyResult& result);
-
-boost::json::object comparison_json(const std::vector<UncertaintyStep>& steps);
-std::string comparison_csv(const std::vector<UncertaintyStep>& steps);
 
 }  // namespace cairn::app

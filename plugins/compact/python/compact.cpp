@@ -28,27 +28,18 @@
 #include "follower.hpp"
 #include "interrupt.hpp"
 #include "python_registration.hpp"
+#include "result_attributes.hpp"
 
 namespace cairn::python {
 namespace {
 
 /// A run, as Python reads it.
 struct BoundResult {
-  PolicyResult result;
-  FoundThresholds found;
-  PolicyData data;  ///< counts of the recording; its graphs are moved away
+  Compaction made;       ///< its graphs are moved away
+  ResultRecord figures;  ///< read before
+  PolicyData data;
   std::unique_ptr<BoundGraph> compact, trajectory;
-  std::optional<MapCheck> check;
-  std::optional<WholeMap> whole;
-  std::vector<std::vector<Id>> left_out;
-  std::string strategy;
   std::vector<std::string> notes;
-
-  std::string status() const {
-    if (result.interrupted) return "interrupted";
-    if (!result.located) return "unlocated";
-    return result.converged ? "converged" : "max_iterations";
-  }
 };
 
 /// Without the interpreter's lock.
@@ -72,12 +63,8 @@ void run(const CompactionJob& job, const PolicySetting& setting, Follower& follo
     for (std::string& doubt : notes_on_estimate(result.compact, chi2(result.compact)).notes)
       out.notes.push_back(std::move(doubt));
   }
-  out.result = std::move(made.result);
-  out.found = std::move(made.found);
-  out.check = made.check;
-  out.whole = std::move(made.whole);
-  out.left_out = std::move(made.left_out);
-  out.strategy = std::move(made.strategy);
+  out.figures = result_record(made);
+  out.made = std::move(made);
 }
 
 const Graph& graph_of(const py::object& given, const char* what) {
@@ -140,73 +127,23 @@ std::unique_ptr<BoundResult> compact(BoundGraph& recording, const std::string& p
   guard.absorb();
   follower.rethrow();
   if (own) own->rethrow();
-  out->compact = std::make_unique<BoundGraph>(std::move(out->result.compact));
-  out->trajectory = std::make_unique<BoundGraph>(std::move(out->result.trajectory));
+  out->compact = std::make_unique<BoundGraph>(std::move(out->made.result.compact));
+  out->trajectory = std::make_unique<BoundGraph>(std::move(out->made.result.trajectory));
   return out;
 }
 
-py::dict counts_of(const BoundResult& bound) {
-  const PolicyResult& result = bound.result;
-  py::dict counts;
-  counts["poses"] = result.poses.size();
-  counts["kept"] = result.kept_poses - result.map_poses;
-  counts["map"] = result.map_poses;
-  counts["loops"] = bound.data.loops;
-  counts["proposed"] = result.proposed;
-  counts["registered"] = result.registered;
-  counts["kept_loops"] = result.kept_loops;
-  counts["false_registered"] = result.false_registered;
-  counts["false_kept"] = result.false_kept;
-  counts["priors"] = bound.data.priors;
-  counts["kept_priors"] = result.kept_priors;
-  counts["landmarks"] = bound.data.landmarks;
-  counts["kept_landmarks"] = result.kept_landmarks;
-  counts["undetermined_landmarks"] = result.undetermined_landmarks;
-  counts["observations"] = bound.data.observations;
-  counts["kept_observations"] = result.kept_observations;
-  counts["nonlinear_observations"] = result.nonlinear_observations;
-  counts["information_nonzeros"] = result.information_nonzeros;
-  counts["factor_nonzeros"] = result.factor_nonzeros;
-  return counts;
-}
-
-py::dict seconds_of(const BoundResult& bound) {
-  py::dict seconds;
-  seconds["total"] = bound.result.seconds.total;
-  seconds["estimate"] = bound.result.seconds.estimate;
-  seconds["covariances"] = bound.result.seconds.covariances;
-  seconds["search"] = bound.result.seconds.search;
-  seconds["registration"] = bound.result.registration_seconds;
-  seconds["thresholds"] = bound.found.seconds;
-  return seconds;
-}
-
 py::object nees_of(const BoundResult& bound) {
-  const auto& normalized = bound.result.normalized;
+  const auto& normalized = bound.made.result.normalized;
   if (!normalized) return py::none();
   return py::make_tuple(normalized->squared, normalized->dof);
 }
 
 void bind_result(py::module_& module) {
-  py::class_<BoundResult>(module, "CompactResult", "What a policy has kept of a recorded graph.")
-      .def_property_readonly("status", &BoundResult::status,
-                             "'converged', 'max_iterations', 'interrupted', or 'unlocated': no "
-                             "match with the map that was to be continued.")
-      .def_readonly("strategy", &BoundResult::strategy,
-                    "'whole', or that of the policy; empty: it has none.")
-      .def_readonly("left_out", &BoundResult::left_out,
-                    "Measurements that contradict the others and are left out: the ids of the "
-                    "variables of each.")
-      .def_property_readonly(
-          "kld",
-          [](const BoundResult& bound) {
-            return bound.whole ? std::optional(bound.whole->kld) : std::nullopt;
-          },
-          "With the strategy 'whole': divergence of the graph from the estimate of all "
-          "measurements, of the poses that are kept [nats]; else None.")
-      .def_property_readonly(
-          "policy", [](const BoundResult& bound) { return bound.result.policy; },
-          "The policy with all its options, those that were found among them.")
+  py::class_<BoundResult> type(module, "CompactResult",
+                               "What a policy has kept of a recorded graph.");
+  type.def_property_readonly(
+          "strategy", [](const BoundResult& bound) { return bound.made.strategy; },
+          "'whole', or that of the policy; empty: it has none.")
       .def_property_readonly(
           "graph", [](const BoundResult& bound) { return bound.compact.get(); },
           py::return_value_policy::reference_internal, "What was kept, at its estimate.")
@@ -216,47 +153,26 @@ void bind_result(py::module_& module) {
           "All poses, those left out put back; without factors. With the strategy 'whole', the "
           "estimate of all measurements.")
       .def_property_readonly(
-          "poses", [](const BoundResult& bound) { return bound.result.poses; },
+          "poses", [](const BoundResult& bound) { return bound.made.result.poses; },
           "A PoseReport for each pose, in the order of arrival.")
-      .def_property_readonly("counts", &counts_of,
-                             "How many poses, loops, priors, landmarks and observations there were "
-                             "and how many of them were kept; pairs proposed and registered; "
-                             "nonzeros of the information matrix and of its factor.")
       .def_property_readonly(
-          "verdicts", [](const BoundResult& bound) { return bound.result.verdicts; },
-          "How many links there were of each verdict.")
-      .def_property_readonly(
-          "chi2", [](const BoundResult& bound) { return bound.result.chi2; }, "Of what was kept.")
-      .def_property_readonly(
-          "errors", [](const BoundResult& bound) { return bound.result.errors; },
+          "errors", [](const BoundResult& bound) { return bound.made.result.errors; },
           "With the truth: a TrajectoryError of all poses, by the name of each recovery, or "
           "'whole'.")
       .def_property_readonly("nees", &nees_of,
                              "With the truth of all poses: (e^T Sigma^-1 e, degrees of freedom), "
                              "the mean of the first being the second where the covariance is "
                              "right; else None.")
-      .def_property_readonly(
-          "distance",
-          [](const BoundResult& bound) {
-            return bound.check ? std::optional(bound.check->distance) : std::nullopt;
-          },
-          "How far all poses (strategy 'whole': those of the graph) are from the map of all "
-          "measurements, after alignment, root mean square [m]; None where that map is no measure "
-          "of it: another map was continued, matches "
-          "were inconsistent, or they were not those of the graph.")
-      .def_property_readonly(
-          "thresholds", [](const BoundResult& bound) { return bound.found.options; },
-          "Options of the policy that were found, as texts.")
-      .def_property_readonly("seconds", &seconds_of,
-                             "Of each part: estimate, covariances, search, registration, "
-                             "thresholds; total without the last two.")
       .def_readonly("notes", &BoundResult::notes, "Sentences for the user.")
       .def("__repr__", [](const BoundResult& bound) {
+        const PolicyResult& result = bound.made.result;
         return fmt::format(
             "<cairn.CompactResult {}: {} of {} poses, {} loop closures, chi2 {:.6g}>",
-            bound.status(), bound.result.kept_poses - bound.result.map_poses,
-            bound.result.poses.size(), bound.result.kept_loops, bound.result.chi2);
+            std::get<std::string>(bound.figures.values[bound.figures.find("status")].data),
+            result.kept_poses - result.map_poses, result.poses.size(), result.kept_loops,
+            result.chi2);
       });
+  bind_fields<Compaction>(type, &BoundResult::figures);
 }
 
 }  // namespace

@@ -1,20 +1,23 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "replay_report.hpp"
+#include "cairn/evaluation/step_times.hpp"
 
 #include <algorithm>
 #include <map>
-#include <numeric>
+#include <optional>
 #include <utility>
 
 #include <fmt/core.h>
 
+#include "cairn/evaluation/step_times.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/program/album.hpp"
 #include "cairn/program/error_metric.hpp"
+#include "cairn/program/figures.hpp"
 #include "cairn/program/json_report.hpp"
 #include "cairn/program/picture_files.hpp"
-#include "cairn/program/step_times.hpp"
 #include "cairn/program/table.hpp"
+#include "cairn/runtime/result_fields.hpp"
 #include "cairn/runtime/threads.hpp"
 
 namespace cairn::app {
@@ -22,48 +25,59 @@ namespace {
 
 namespace json = boost::json;
 
-StepTimes step_times(const Replay& replay) {
-  std::vector<double> seconds;
-  for (const ReplayStep& step : replay.steps) seconds.push_back(step.seconds);
-  return StepTimes(std::move(seconds));
+/// How often covariances were updated in each way.
+std::map<std::string, int> marginals_by(const Replay& replay) {
+  std::map<std::string, int> counts;
+  for (const ReplayStep& step : replay.steps)
+    ++counts[std::string(to_string(step.report.marginals_by))];
+  return counts;
 }
 
-json::array checks_json(const Replay& replay) {
-  json::array all;
-  for (const BatchCheck& check : replay.checks) {
-    json::object one{{"step", check.step},
-                     {"chi2", check.chi2},
-                     {"batch", check.batch},
-                     {"polished", check.polished},
-                     {"excess", check.excess()}};
-    if (check.covariance_difference) one["covariance_difference"] = *check.covariance_difference;
-    all.push_back(std::move(one));
+auto sum_of(int UpdateReport::*member) {
+  return [member](const Replay& replay) {
+    std::int64_t sum = 0;
+    for (const ReplayStep& step : replay.steps) sum += step.report.*member;
+    return sum;
+  };
+}
+
+/// A row of the table of steps.
+struct StepRow {
+  int number;  ///< from 1
+  const ReplayStep* step;
+
+  static ResultFields<StepRow> fields() {
+    using R = StepRow;
+    const auto of_report = [](auto UpdateReport::*member) {
+      return [member](const R& r) { return r.step->report.*member; };
+    };
+    return ResultFields<R>()
+        .figure("step", &R::number, "from 1")
+        .figure(
+            "variables", [](const R& r) { return r.step->variables; }, "of the graph, after it")
+        .figure(
+            "factors", [](const R& r) { return r.step->factors; }, "of the graph, after it")
+        .figure(
+            "seconds", [](const R& r) { return r.step->seconds; }, "s", "of the step")
+        .part([](const R& r) { return r.step->report.seconds; })
+        .without("total")
+        .figure(
+            "estimate", [](const R& r) { return r.step->estimate; }, "s", "reading the estimate")
+        .figure("affected", of_report(&UpdateReport::affected_variables),
+                "variables whose columns of the factor were recomputed, summed")
+        .figure("relinearized", of_report(&UpdateReport::relinearized_factors),
+                "factors besides the new ones")
+        .figure("owed", of_report(&UpdateReport::owed),
+                "factors whose relinearisation was deferred to later updates")
+        .figure("iterations", of_report(&UpdateReport::iterations), "linear systems solved")
+        .figure("ok", of_report(&UpdateReport::ok), "whether H was positive definite")
+        .figure(
+            "chi2", [](const R& r) { return r.step->chi2; }, "where it is known")
+        .csv("{:.17g}")
+        .figure("marginals_by", of_report(&UpdateReport::marginals_by),
+                "how covariances were updated");
   }
-  return all;
-}
-
-json::object marginals_by_json(const Replay& replay) {
-  std::map<std::string_view, int> counts;
-  for (const ReplayStep& step : replay.steps) ++counts[to_string(step.report.marginals_by)];
-  json::object all;
-  for (const auto& [by, count] : counts) all[by] = count;
-  return all;
-}
-
-template <class Member>
-std::int64_t sum(const Replay& replay, Member member) {
-  return std::accumulate(
-      replay.steps.begin(), replay.steps.end(), std::int64_t{0},
-      [&](std::int64_t total, const ReplayStep& step) { return total + step.report.*member; });
-}
-
-std::string phases_text(const Replay& replay) {
-  const UpdateSeconds& s = replay.seconds;
-  return fmt::format("{} (linearize {}, order {}, factorize {}, solve {}, check {}, marginals {})",
-                     seconds_text(replay.total), seconds_text(s.linearize), seconds_text(s.order),
-                     seconds_text(s.factorize), seconds_text(s.solve), seconds_text(s.check),
-                     seconds_text(s.marginals));
-}
+};
 
 std::string checks_text(const Replay& replay) {
   double worst = 0.0, covariance = 0.0;
@@ -91,6 +105,51 @@ std::string_view status(const Replay& replay) {
   return !last.ok ? "not_positive_definite" : !last.converged ? "max_iterations" : "converged";
 }
 
+ResultFields<Replay> Replay::fields() {
+  using R = Replay;
+  const auto of_all = [](double BatchCheck::*member) {
+    return [member](const R& r) {
+      const bool complete =
+          !r.checks.empty() && r.checks.back().step == static_cast<int>(std::ssize(r.steps));
+      return complete ? std::optional(r.checks.back().*member) : std::nullopt;
+    };
+  };
+  return ResultFields<R>()
+      .figure(
+          "status", [](const R& r) { return status(r); }, "how the last update ended")
+      .part("steps",
+            [](const R& r) {
+              std::vector<double> seconds;
+              for (const ReplayStep& step : r.steps) seconds.push_back(step.seconds);
+              return StepTimes(std::move(seconds));
+            })
+      .figure("chi2.batch", of_all(&BatchCheck::batch),
+              "of an optimisation of everything from the initial estimate")
+      .round("{:.8g}")
+      .figure("chi2.polished", of_all(&BatchCheck::polished),
+              "of an optimisation of everything from the estimate")
+      .round("{:.8g}")
+      .part("seconds", &R::seconds)
+      .without("seconds.total")
+      .figure("seconds.total", &R::total, "s", "of all steps")
+      .before("seconds.linearize")
+      .figure("seconds.estimate", &R::estimate, "s", "reading estimates")
+      .figure("affected_variables", sum_of(&UpdateReport::affected_variables),
+              "variables whose columns of the factor were recomputed, summed")
+      .figure("relinearized_factors", sum_of(&UpdateReport::relinearized_factors),
+              "factors besides the new ones")
+      .figure("iterations", sum_of(&UpdateReport::iterations), "linear systems solved")
+      .figure(
+          "owed", [](const R& r) { return r.steps.empty() ? 0 : r.steps.back().report.owed; },
+          "factors whose relinearisation is deferred")
+      .figure("failed_updates", &R::failed, "updates whose H was not positive definite")
+      .figure("marginals_by", &marginals_by, "how often covariances were updated in each way")
+      .figure("checks", &R::checks, "each comparison with batch optimisation")
+      .figure("notes", &R::notes, "sentences for the user")
+      .figure("doubts", &R::doubts, "those that give reason to doubt the estimate")
+      .details();
+}
+
 json::object report_json(const ReplayOptions& options, const LoadedGraph& loaded, bool sorted,
                          const Replay& replay, const Estimator& estimator, double chi2) {
   json::object report = begin_report("replay");
@@ -114,34 +173,10 @@ json::object report_json(const ReplayOptions& options, const LoadedGraph& loaded
                       {"variables", estimator.variable_count()},
                       {"factors", estimator.factor_count()}};
   }
-  report["status"] = status(replay);
-  report["steps"] = step_times_json(step_times(replay));
   report["chi2"] = {{"final", chi2}};
-  const bool complete = !replay.checks.empty() &&
-                        replay.checks.back().step == static_cast<int>(std::ssize(replay.steps));
-  json::object& of_chi2 = report["chi2"].as_object();
-  of_chi2["batch"] = complete ? json::value(replay.checks.back().batch) : json::value(nullptr);
-  of_chi2["polished"] =
-      complete ? json::value(replay.checks.back().polished) : json::value(nullptr);
-  report["seconds"] = {{"read", loaded.seconds},
-                       {"total", replay.total},
-                       {"linearize", replay.seconds.linearize},
-                       {"order", replay.seconds.order},
-                       {"factorize", replay.seconds.factorize},
-                       {"solve", replay.seconds.solve},
-                       {"check", replay.seconds.check},
-                       {"marginals", replay.seconds.marginals},
-                       {"estimate", replay.estimate}};
-  report["affected_variables"] = sum(replay, &UpdateReport::affected_variables);
-  report["relinearized_factors"] = sum(replay, &UpdateReport::relinearized_factors);
-  report["iterations"] = sum(replay, &UpdateReport::iterations);
-  report["owed"] = replay.steps.empty() ? 0 : replay.steps.back().report.owed;
-  report["failed_updates"] = replay.failed;
-  report["marginals_by"] = marginals_by_json(replay);
-  report["checks"] = checks_json(replay);
+  report["seconds"] = {{"read", loaded.seconds}};
+  put(report, replay);
   report["estimator_memory_bytes"] = estimator.memory();
-  report["notes"] = strings_json(replay.notes);
-  report["doubts"] = strings_json(replay.doubts);
   report["read_notes"] = strings_json(sentences(loaded.report));
   report["output"] = text_json(options.output);
   end_report(report);
@@ -149,22 +184,10 @@ json::object report_json(const ReplayOptions& options, const LoadedGraph& loaded
 }
 
 std::string steps_csv(const Replay& replay) {
-  std::string text =
-      "step,variables,factors,seconds,linearize,order,factorize,solve,check,marginals,estimate,"
-      "affected,relinearized,owed,iterations,ok,chi2,marginals_by\n";
+  CsvText csv(result_fields<StepRow>().all());
   int number = 0;
-  for (const ReplayStep& step : replay.steps) {
-    const UpdateSeconds& s = step.report.seconds;
-    text += fmt::format("{},{},{},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},{:.9f},",
-                        ++number, step.variables, step.factors, step.seconds, s.linearize, s.order,
-                        s.factorize, s.solve, s.check, s.marginals, step.estimate);
-    text += fmt::format("{},{},{},{},{},{},{}\n", step.report.affected_variables,
-                        step.report.relinearized_factors, step.report.owed, step.report.iterations,
-                        step.report.ok ? 1 : 0,
-                        std::isnan(step.chi2) ? "" : fmt::format("{:.17g}", step.chi2),
-                        to_string(step.report.marginals_by));
-  }
-  return text;
+  for (const ReplayStep& step : replay.steps) csv.add(result_record(StepRow{++number, &step}));
+  return csv.text();
 }
 
 void draw_steps(const Replay& replay, const ReplayOptions& options, const LoadedGraph& loaded,
@@ -202,8 +225,10 @@ std::string summary_text(const ReplayOptions& options, const LoadedGraph& loaded
                                    replay.kld, plural(replay.dropped, "measurement"))});
   }
   table.add({"chi2", chi2_text(chi2)});
-  table.add({"time", phases_text(replay)});
-  table.add({"steps", step_times(replay).text()});
+  const Figures figures(replay);
+  table.add({"time", figures.times("seconds", {"estimate"})});
+  table.add({"steps", figures.steps("steps")});
+  figures.add_rows(table);
   if (!replay.checks.empty()) table.add({"batch", checks_text(replay)});
   if (const int owed = replay.steps.empty() ? 0 : replay.steps.back().report.owed; owed > 0)
     table.add({"owed", plural(owed, "factor") + " to be relinearized"});

@@ -14,6 +14,7 @@
 #include "cairn/program/problem_setup.hpp"
 #include "cairn/program/results.hpp"
 #include "cairn/program/session.hpp"
+#include "cairn/runtime/result_fields_fwd.hpp"
 #include "cairn/solve/estimator.hpp"
 
 namespace cairn::app {
@@ -68,6 +69,8 @@ struct Replay {
   std::vector<std::string> notes;
   std::vector<std::string> doubts;  ///< of the last estimate; each is among the notes
   bool interrupted = false;
+
+  static ResultFields<Replay> fields();
 };
 
 /// "converged", "interrupted" or, of the last update, "not_positive_definite" and, where it was to

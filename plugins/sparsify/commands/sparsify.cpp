@@ -15,13 +15,13 @@
 #include "cairn/plugin/registry.hpp"
 #include "cairn/program/command.hpp"
 #include "cairn/program/error_metric.hpp"
+#include "cairn/program/figures.hpp"
 #include "cairn/program/graph_files.hpp"
 #include "cairn/program/interrupt.hpp"
 #include "cairn/program/json_report.hpp"
 #include "cairn/program/problem_setup.hpp"
 #include "cairn/program/progress.hpp"
 #include "cairn/program/results.hpp"
-#include "cairn/program/step_times.hpp"
 #include "cairn/program/table.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
@@ -116,17 +116,6 @@ void check_topology(const SparsifyCommandOptions& options, const SparsifyJob& jo
   }
 }
 
-json::object nonzeros_json(const Nonzeros& nonzeros) {
-  return {{"information", nonzeros.information}, {"factor", nonzeros.factor}};
-}
-
-json::array notes_json(const Sparsification& change) {
-  json::array notes;
-  for (const SparsificationNote& note : change.notes)
-    notes.push_back({{"text", note.text}, {"problems", note.problems}});
-  return notes;
-}
-
 json::object report_json(const SparsifyCommandOptions& options, const LoadedGraph& loaded,
                          const SparsifyJob& job, const SparsifyResult& result) {
   json::object report = begin_report("sparsify");
@@ -136,41 +125,7 @@ json::object report_json(const SparsifyCommandOptions& options, const LoadedGrap
   report["nodes"] = options.nodes;
   report["online"] = job.online;
   report["threads"] = threads();
-  report["status"] = result.interrupted ? "interrupted" : to_string(result.status);
-  report["poses"] = {{"in", result.variables_before}, {"kept", result.sparse.variable_count()}};
-  report["factors"] = {{"in", result.factors_before}, {"out", result.sparse.factor_count()}};
-  const Sparsification& change = result.change;
-  report["problems"] = {{"count", change.problems},
-                        {"mean_blanket", change.mean_blanket},
-                        {"largest_blanket", change.largest_blanket},
-                        {"kld", change.kld},
-                        {"not_converged", change.not_converged},
-                        {"notes", notes_json(change)}};
-  json::array refused;
-  for (const RefusedNode& node : change.refused)
-    refused.push_back({{"node", node.node}, {"reason", node.reason}});
-  report["refused"] = std::move(refused);
-  report["kld"] = result.error ? json::value(result.error->kld) : json::value(nullptr);
-  report["rmse"] = result.error ? number_json(result.error->rmse) : json::value(nullptr);
-  report["rmse_aligned"] =
-      result.error ? number_json(result.error->rmse_aligned) : json::value(nullptr);
-  if (result.error)
-    report["kld_parts"] = {{"covariance", result.error->covariance}, {"mean", result.error->mean}};
-  report["nonzeros"] = {{"before", nonzeros_json(result.nonzeros_before)},
-                        {"after", nonzeros_json(result.nonzeros_after)}};
-  report["conservative_margin"] = number_json(result.conservative_margin);
-  report["chi2"] = {{"before", result.chi2_before}, {"after", result.chi2_after}};
-  report["seconds"] = {
-      {"total", change.seconds.total},           {"marginalize", change.seconds.marginalize},
-      {"covariance", change.seconds.covariance}, {"topology", change.seconds.topology},
-      {"recovery", change.seconds.recovery},     {"select", result.select_seconds}};
-  if (job.online > 0) {
-    report["redirected"] = result.redirected;
-    report["dropped"] = result.dropped;
-    report["rmse_full"] = number_json(result.rmse_full);
-    report["steps"] = step_times_json(StepTimes(result.steps));
-  }
-  report["notes"] = strings_json(result.notes);
+  put(report, result);
   report["output"] = text_json(options.output);
   end_report(report);
   return report;
@@ -179,53 +134,44 @@ json::object report_json(const SparsifyCommandOptions& options, const LoadedGrap
 std::string summary_text(const SparsifyCommandOptions& options, const LoadedGraph& loaded,
                          const SparsifyJob& job, const SparsifyResult& result,
                          const Results& results, const Session& session) {
-  const Sparsification& change = result.change;
+  const Figures figures(result);
   Table table({{"", Table::Align::left}, {"", Table::Align::left}});
   table.add(
       {"graph", fmt::format("{}: {}, {}", loaded.name, plural(result.variables_before, "variable"),
                             plural(result.factors_before, "factor"))});
   add_metric(table, loaded.graph, session);
-  const auto removed = static_cast<std::int64_t>(std::ssize(change.removed_variables));
-  table.add(
-      {"removed", fmt::format("{} ({}{}), in {} whose neighbours are {:.2f} on average, {} at most",
-                              plural(removed, "node"), spec_text(job.selection),
-                              job.online > 0 ? fmt::format(", every {} poses", job.online) : "",
-                              plural(change.problems, "problem"), change.mean_blanket,
-                              change.largest_blanket)});
+  const auto removed = static_cast<std::int64_t>(std::ssize(result.change.removed_variables));
+  table.add({"removed",
+             fmt::format("{} ({}{}), in {} whose neighbours are {} on average, {} at most",
+                         plural(removed, "node"), spec_text(job.selection),
+                         job.online > 0 ? fmt::format(", every {} poses", job.online) : "",
+                         plural(result.change.problems, "problem"),
+                         figures["problems.mean_blanket"], figures["problems.largest_blanket"])});
   table.add({"left", fmt::format("{}, {} ({})", plural(result.sparse.variable_count(), "variable"),
                                  plural(result.sparse.factor_count(), "factor"),
                                  spec_text(job.sparsifier))});
   if (result.error) {
-    std::string text = fmt::format("KLD {:.4g} nats of the whole", result.error->kld);
-    if (std::isfinite(result.error->rmse))
-      text += fmt::format("; the estimate has moved by {:.3g} m (RMS), {:.3g} m after alignment",
-                          result.error->rmse, result.error->rmse_aligned);
+    std::string text = fmt::format("KLD {} of the whole{}", figures["kld"], moved_text(result));
     if (job.online > 0 && std::isfinite(result.rmse_full))
-      text += fmt::format(", from that with all measurements by {:.3g} m", result.rmse_full);
+      text += fmt::format(", from that with all measurements by {}", figures["rmse_full"]);
     table.add({"lost", text});
     if (std::isfinite(result.conservative_margin)) {
-      table.add({"margin", fmt::format("{:.3g}, the smallest eigenvalue of Λ − Λ̆ (conservative "
-                                       "from 0 on)",
-                                       result.conservative_margin)});
+      table.add({"margin", fmt::format("{}, the smallest eigenvalue of Λ − Λ̆ (conservative from "
+                                       "0 on)",
+                                       figures["conservative_margin"])});
     }
   }
-  const SparsificationSeconds& seconds = change.seconds;
-  const std::string covariance =
-      seconds.covariance > 0.0
-          ? fmt::format("covariance in the graph {}, ", seconds_text(seconds.covariance))
-          : "";
-  table.add(
-      {"time", fmt::format("{} (marginalize {}, {}topology {}, recovery {}), select {}",
-                           seconds_text(seconds.total), seconds_text(seconds.marginalize),
-                           covariance, seconds_text(seconds.topology),
-                           seconds_text(seconds.recovery), seconds_text(result.select_seconds))});
+  const bool fitted = result.change.seconds.covariance > 0.0;
+  table.add({"time", fmt::format("{}, select {}",
+                                 figures.times("seconds", {"select", fitted ? "" : "covariance"}),
+                                 figures["seconds.select"])});
   if (job.online > 0) {
-    table.add({"a pose", StepTimes(result.steps).text()});
+    table.add({"a pose", figures.steps("steps")});
     table.add({"late", fmt::format("{} for nodes that had left redirected, {} dropped",
                                    plural(result.redirected, "factor"), result.dropped)});
   }
-  const Status status = result.interrupted ? Status::interrupted : result.status;
-  if (status != Status::converged) table.add({"status", std::string(to_string(status))});
+  figures.add_rows(table);
+  if (figures["status"] != "converged") table.add({"status", figures["status"]});
   for (const std::string& file : results.written({options.output, options.record}))
     table.add({"output", file});
   return table.text(false);
@@ -265,11 +211,19 @@ void note_refused(const Sparsification& change, const Session& session) {
 
 }  // namespace
 
+std::string moved_text(const SparsifyResult& result) {
+  if (!result.error || !std::isfinite(result.error->rmse)) return "";
+  const Figures figures(*result.error);
+  return fmt::format("; the estimate has moved by {} (RMS), {} after alignment", figures["rmse"],
+                     figures["rmse_aligned"]);
+}
+
 int run_sparsify(SparsifyCommandOptions options, Session& session) {
   if (options.as_given) keep_states(options.problem);
   session.use_threads();
   check_output(options.output, options.output_format, session);
   check_file(options.record, session);
+  options.figures.check(session);
   if (!options.edges.empty()) return run_sparsify_edges(options, session);
   Registry& registry = session.registry();
   const SparsifyJob job = job_of(options, session);
@@ -308,6 +262,7 @@ int run_sparsify(SparsifyCommandOptions options, Session& session) {
                 output_format(options.output, options.output_format));
   });
   results.write(options.record, [&] { write_file(options.record, recorder.text()); });
+  options.figures.write(Figures(result), results);
   results.add([&] { session.write_json(report_json(options, loaded, job, result)); });
   results.add([&] { session.print(summary_text(options, loaded, job, result, results, session)); });
   results.finish();
@@ -362,6 +317,7 @@ OptionFields<SparsifyCommandOptions> SparsifyCommandOptions::fields() {
                  "the linear solver that gives determinants")
       .boolean("as_given", &O::as_given, "the graph is at its minimum: do not optimise it")
       .boolean("no_kld", &O::no_kld, "do not compute the divergence (KLD)")
+      .part(&O::figures)
       .part(&O::problem)
       .part(&O::input);
 }

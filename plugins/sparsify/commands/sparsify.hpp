@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "cairn/program/figure_files.hpp"
 #include "cairn/program/graph_files.hpp"
 #include "cairn/program/problem_setup.hpp"
 #include "cairn/program/session.hpp"
@@ -23,6 +24,7 @@ struct SparsifyCommandOptions {
   std::string estimator = "incremental_cholesky";
   std::optional<std::int64_t> online;  ///< take nodes out every so many poses
   bool as_given = false, no_kld = false;
+  FigureFiles figures;
   InputOptions input;
   ProblemOptions problem;
   // Of studies:
@@ -36,6 +38,10 @@ struct SparsifyCommandOptions {
 
   static OptionFields<SparsifyCommandOptions> fields();
 };
+
+/// "; the estimate has moved by 0.1 m (RMS), 0.05 m after alignment"; empty where that is not
+/// known.
+std::string moved_text(const SparsifyResult& result);
 
 /// Returns the exit code.
 int run_sparsify(SparsifyCommandOptions options, Session& session);

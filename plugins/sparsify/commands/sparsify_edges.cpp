@@ -14,6 +14,7 @@
 #include "cairn/plugin/registry.hpp"
 #include "cairn/program/command.hpp"
 #include "cairn/program/error_metric.hpp"
+#include "cairn/program/figures.hpp"
 #include "cairn/program/graph_files.hpp"
 #include "cairn/program/interrupt.hpp"
 #include "cairn/program/json_report.hpp"
@@ -67,43 +68,13 @@ SparsifyEdgesJob job_of(const SparsifyCommandOptions& options, Session& session)
           .compared_at = options.compared_at == "minima" ? ComparedAt::minima : ComparedAt::common};
 }
 
-json::object connectivity_json(const SparsifyEdgesResult& result) {
-  json::object all;
-  for (const EdgeWeight weight : {EdgeWeight::rotation, EdgeWeight::translation}) {
-    const Connectivity& of = result.connectivity[static_cast<std::size_t>(weight)];
-    all[to_string(weight)] = {{"full", number_json(of.full)},
-                              {"sparse", number_json(of.sparse)},
-                              {"bound", number_json(of.bound)}};
-  }
-  return all;
-}
-
 json::object report_json(const SparsifyCommandOptions& options, const LoadedGraph& loaded,
                          const SparsifyEdgesJob& job, const SparsifyEdgesResult& result) {
-  const SparsifyResult& whole = result.whole;
   json::object report = begin_report("sparsify");
   report["graph"] = graph_json(loaded.graph, loaded.name);
   report["edges"] = to_text(job.selection);
   report["threads"] = threads();
-  report["status"] = whole.interrupted ? "interrupted" : to_string(whole.status);
-  report["poses"] = {{"in", whole.variables_before}, {"kept", whole.sparse.variable_count()}};
-  report["factors"] = {{"in", whole.factors_before}, {"out", whole.sparse.factor_count()}};
-  const auto loops = std::ssize(result.closures.candidates);
-  report["loops"] = {{"in", loops}, {"kept", loops - std::ssize(whole.change.removed_factors)}};
-  report["backbone"] = {{"factors", std::ssize(result.closures.backbone)},
-                        {"odometry", result.closures.odometry},
-                        {"components", result.closures.components}};
-  report["kld"] = whole.error ? json::value(whole.error->kld) : json::value(nullptr);
-  report["kld_bound"] = number_json(result.choice.kld_bound.value_or(std::nan("")));
-  report["rmse"] = whole.error ? number_json(whole.error->rmse) : json::value(nullptr);
-  report["rmse_aligned"] =
-      whole.error ? number_json(whole.error->rmse_aligned) : json::value(nullptr);
-  if (whole.error)
-    report["kld_parts"] = {{"covariance", whole.error->covariance}, {"mean", whole.error->mean}};
-  report["connectivity"] = connectivity_json(result);
-  report["chi2"] = {{"before", whole.chi2_before}, {"after", whole.chi2_after}};
-  report["seconds"] = {{"total", whole.select_seconds}, {"select", whole.select_seconds}};
-  report["notes"] = strings_json(whole.notes);
+  put(report, result);
   report["output"] = text_json(options.output);
   end_report(report);
   return report;
@@ -128,6 +99,7 @@ std::string summary_text(const SparsifyCommandOptions& options, const LoadedGrap
                          const SparsifyEdgesJob& job, const SparsifyEdgesResult& result,
                          const Results& results, const Session& session) {
   const SparsifyResult& whole = result.whole;
+  const Figures figures(result);
   Table table({{"", Table::Align::left}, {"", Table::Align::left}});
   table.add(
       {"graph", fmt::format("{}: {}, {}", loaded.name, plural(whole.variables_before, "variable"),
@@ -139,23 +111,19 @@ std::string summary_text(const SparsifyCommandOptions& options, const LoadedGrap
   table.add({"left", fmt::format("{}, {}", plural(whole.sparse.variable_count(), "variable"),
                                  plural(whole.sparse.factor_count(), "factor"))});
   if (whole.error) {
-    std::string text = fmt::format("KLD {:.4g} nats of the whole", whole.error->kld);
+    std::string text = fmt::format("KLD {} of the whole", figures["kld"]);
     if (result.choice.kld_bound) {
-      text += fmt::format(
-          ", {:.4g} of them of covariances (no choice of as many has less than "
-          "{:.4g})",
-          whole.error->covariance, *result.choice.kld_bound);
+      text += fmt::format(", {} of them of covariances (no choice of as many has less than {})",
+                          figures.number("kld_parts.covariance"), figures.number("kld_bound"));
     }
-    if (std::isfinite(whole.error->rmse))
-      text += fmt::format("; the estimate has moved by {:.3g} m (RMS), {:.3g} m after alignment",
-                          whole.error->rmse, whole.error->rmse_aligned);
+    text += moved_text(whole);
     table.add({"lost", text});
   }
   if (const std::string text = connectivity_text(result); !text.empty())
     table.add({"algebraic connectivity", text});
-  table.add({"time", fmt::format("select {}", seconds_text(whole.select_seconds))});
-  const Status status = whole.interrupted ? Status::interrupted : whole.status;
-  if (status != Status::converged) table.add({"status", std::string(to_string(status))});
+  table.add({"time", fmt::format("select {}", figures["seconds.select"])});
+  figures.add_rows(table);
+  if (figures["status"] != "converged") table.add({"status", figures["status"]});
   for (const std::string& file : results.written({options.output})) table.add({"output", file});
   return table.text(false);
 }
@@ -196,6 +164,7 @@ int run_sparsify_edges(const SparsifyCommandOptions& options, Session& session) 
     write_graph(result.whole.sparse, options.output, registry,
                 output_format(options.output, options.output_format));
   });
+  options.figures.write(Figures(result), results);
   results.add([&] { session.write_json(report_json(options, loaded, job, result)); });
   results.add([&] { session.print(summary_text(options, loaded, job, result, results, session)); });
   results.finish();

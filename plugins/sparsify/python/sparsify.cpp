@@ -24,20 +24,18 @@
 #include "component_names.hpp"
 #include "interrupt.hpp"
 #include "named_guess.hpp"
+#include "result_attributes.hpp"
 
 namespace cairn::python {
 namespace {
 
 /// A sparsification, as Python reads it.
 struct BoundSparsified {
-  SparsifyResult result;
+  SparsifyResult result;  ///< its graph is moved away
+  ResultRecord figures;   ///< read before
   std::unique_ptr<BoundGraph> graph;
   std::vector<Id> removed;
   std::optional<SparsifyEdgesResult> edges;  ///< of `sparsify_edges`
-
-  std::string status() const {
-    return std::string(to_string(result.interrupted ? Status::interrupted : result.status));
-  }
 };
 
 /// What both functions take: how the graph is optimised before and after.
@@ -111,6 +109,7 @@ std::unique_ptr<BoundSparsified> sparsify(
   for (int v = 0; v < use.graph().variable_count(); ++v) {
     if (!out->result.sparse.find(use.graph().id(v))) out->removed.push_back(use.graph().id(v));
   }
+  out->figures = result_record(out->result);
   out->graph = std::make_unique<BoundGraph>(std::move(out->result.sparse));
   return out;
 }
@@ -136,16 +135,12 @@ std::unique_ptr<BoundSparsified> sparsify_loop_closures(
   }
   guard.absorb();
   out->result = std::move(out->edges->whole);
+  out->figures = result_record(out->result);
   out->graph = std::make_unique<BoundGraph>(std::move(out->result.sparse));
   return out;
 }
 
 // The result --------------------------------------------------------------------------------------
-
-/// NaN where it was not measured.
-double error_of(const BoundSparsified& bound, double SparsificationError::*member) {
-  return bound.result.error ? *bound.result.error.*member : std::nan("");
-}
 
 py::list refused_of(const BoundSparsified& bound) {
   py::list refused;
@@ -154,28 +149,12 @@ py::list refused_of(const BoundSparsified& bound) {
   return refused;
 }
 
-py::dict seconds_of(const BoundSparsified& bound) {
-  const SparsificationSeconds& seconds = bound.result.change.seconds;
-  py::dict result;
-  result["total"] = seconds.total;
-  result["marginalize"] = seconds.marginalize;
-  result["covariance"] = seconds.covariance;
-  result["topology"] = seconds.topology;
-  result["recovery"] = seconds.recovery;
-  result["select"] = bound.result.select_seconds;
-  return result;
-}
-
 py::object connectivity_of(const BoundSparsified& bound) {
   if (!bound.edges) return py::none();
   py::dict all;
   for (const EdgeWeight weight : {EdgeWeight::rotation, EdgeWeight::translation}) {
     const Connectivity& of = bound.edges->connectivity[static_cast<std::size_t>(weight)];
-    py::dict one;
-    one["full"] = of.full;
-    one["sparse"] = of.sparse;
-    one["bound"] = of.bound;
-    all[py::str(std::string(to_string(weight)))] = one;
+    all[py::str(std::string(to_string(weight)))] = dict_of(result_record(of));
   }
   return all;
 }
@@ -186,42 +165,9 @@ std::vector<std::string> notes_of(const BoundSparsified& bound) {
   return notes;
 }
 
-void bind_measures(py::class_<BoundSparsified>& result) {
-  const auto measure = [&](const char* name, double SparsificationError::*member, const char* doc) {
-    result.def_property_readonly(
-        name, [member](const BoundSparsified& bound) { return error_of(bound, member); }, doc);
-  };
-  measure("kld", &SparsificationError::kld,
-          "Divergence of the sparse graph from the original one, of the variables of both [nats].");
-  measure("rmse", &SparsificationError::rmse, "By how much positions have moved [m].");
-  measure("rmse_aligned", &SparsificationError::rmse_aligned, "The same after alignment [m].");
-  result
-      .def_property_readonly(
-          "conservative_margin",
-          [](const BoundSparsified& bound) { return bound.result.conservative_margin; },
-          "The smallest eigenvalue of the original information less the sparse one; from 0 on the "
-          "sparse graph is conservative. NaN: not known.")
-      .def_property_readonly(
-          "connectivity", &connectivity_of,
-          "Of `sparsify_edges`: the algebraic connectivity by 'rotation' and "
-          "'translation': 'full', 'sparse', and an upper 'bound' of any choice of "
-          "as many edges (NaN: not known). Else None.")
-      .def_property_readonly(
-          "chi2", [](const BoundSparsified& bound) { return bound.result.chi2_after; },
-          "Of the sparse graph at its minimum.")
-      .def_property_readonly(
-          "initial_chi2", [](const BoundSparsified& bound) { return bound.result.chi2_before; },
-          "Of the original graph at its minimum.");
-}
-
 void bind_sparsified(py::module_& module) {
-  py::class_<BoundSparsified> result(module, "SparsifyResult",
-                                     "A sparse graph, and what was lost.");
-  result
-      .def_property_readonly("status", &BoundSparsified::status,
-                             "As of `Summary.status`: the first optimisation that has not "
-                             "converged, or 'converged'.")
-      .def_property_readonly(
+  py::class_<BoundSparsified> type(module, "SparsifyResult", "A sparse graph, and what was lost.");
+  type.def_property_readonly(
           "graph", [](const BoundSparsified& bound) { return bound.graph.get(); },
           py::return_value_policy::reference_internal, "The sparse graph at its minimum.")
       .def_property_readonly(
@@ -230,18 +176,18 @@ void bind_sparsified(py::module_& module) {
       .def_property_readonly("refused", &refused_of,
                              "Chosen variables that could not leave: (id, reason) each.")
       .def_property_readonly(
-          "problems", [](const BoundSparsified& bound) { return bound.result.change.problems; },
-          "How many sets of neighbours got new factors.")
-      .def_property_readonly("seconds", &seconds_of,
-                             "Of each part: marginalize, covariance (of neighbours in the whole "
-                             "graph, for fit), topology, recovery, select; total of all but the "
-                             "last.")
+          "connectivity", &connectivity_of,
+          "Of `sparsify_edges`: the algebraic connectivity by 'rotation' and "
+          "'translation': 'full', 'sparse', and an upper 'bound' of any choice of "
+          "as many edges (NaN: not known). Else None.")
       .def_property_readonly("notes", &notes_of, "Sentences for the user.")
       .def("__repr__", [](const BoundSparsified& bound) {
-        return fmt::format("<cairn.SparsifyResult {}: {} removed, KLD {:.4g} nats>", bound.status(),
-                           bound.removed.size(), error_of(bound, &SparsificationError::kld));
+        const auto& result = bound.result;
+        return fmt::format("<cairn.SparsifyResult {}: {} removed, KLD {:.4g} nats>",
+                           to_string(result.interrupted ? Status::interrupted : result.status),
+                           bound.removed.size(), result.error ? result.error->kld : std::nan(""));
       });
-  bind_measures(result);
+  bind_fields<SparsifyResult>(type, &BoundSparsified::figures);
 }
 
 }  // namespace

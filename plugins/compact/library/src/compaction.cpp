@@ -8,6 +8,7 @@
 
 #include "cairn/evaluation/plausibility.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/result_fields.hpp"
 #include "cairn/text/spelling.hpp"
 
 namespace cairn {
@@ -185,6 +186,58 @@ class Maker {
 Compaction compact_recording(const CompactionJob& job, PolicyData& data,
                              const PolicySetting& setting, const CompactionWatch& watch) {
   return Maker(job, data, setting, watch).make();
+}
+
+ResultFields<Compaction> Compaction::fields() {
+  using C = Compaction;
+  return ResultFields<C>()
+      .figure(
+          "strategy",
+          [](const C& c) { return c.strategy.empty() ? std::nullopt : std::optional(c.strategy); },
+          "whole, or that of the policy")
+      .figure(
+          "status",
+          [](const C& c) {
+            return c.result.interrupted ? "interrupted"
+                   : !c.result.located  ? "unlocated"
+                   : c.result.converged ? "converged"
+                                        : "max_iterations";
+          },
+          "converged, max_iterations, interrupted, or unlocated: no match with the map that was "
+          "to be continued")
+      .details()
+      .part("thresholds", &C::found, "threshold_search")
+      .at("thresholds.found")
+      .attribute("thresholds")
+      .part(&C::result)
+      .without("loops.in")
+      .figure(
+          "loops.in", [](const C& c) { return c.result.loops + c.loops_left_out; },
+          "loop closures of the recording")
+      .before("loops.proposed")
+      .detail()
+      .attribute("counts.recorded_loops")
+      .figure(
+          "loops.used", [](const C& c) { return c.result.loops; },
+          "those of them that do not contradict the others")
+      .before("loops.proposed")
+      .detail()
+      .attribute("counts.loops")
+      .part("check", &C::check)
+      .part("whole", &C::whole)
+      .figure("left_out", &C::left_out,
+              "measurements that contradict the others and are left out: the ids of the variables "
+              "of each")
+      .figure(
+          "located", [](const C& c) { return c.result.located; },
+          "whether the trajectory was matched with the map that was to be continued")
+      .detail()
+      .at("thresholds.seconds")
+      .attribute("seconds.thresholds")
+      .at("check.distance")
+      .attribute("distance")
+      .at("whole.kld")
+      .attribute("kld");
 }
 
 }  // namespace cairn

@@ -7,6 +7,8 @@
 
 #include <fmt/core.h>
 
+#include "cairn/runtime/result_fields.hpp"
+
 namespace cairn {
 
 double extent_of(const Trajectory& poses) {
@@ -32,6 +34,17 @@ std::optional<MapCheck> check_map(const PolicyJob& job, const PolicyResult& resu
   if (!all.why_not.empty()) return std::nullopt;
   const Trajectory everything = trajectory(all.graph);
   return MapCheck{absolute_error(trajectory(result.trajectory), everything), extent_of(everything)};
+}
+
+ResultFields<MapCheck> MapCheck::fields() {
+  using C = MapCheck;
+  return ResultFields<C>()
+      .figure("distance", &C::distance, "m",
+              "how far the poses are from the map of all measurements, after alignment, root mean "
+              "square; missing where that map is no measure: another map was continued, matches "
+              "were inconsistent, or they were not those of the graph")
+      .figure("extent", &C::extent, "m", "diagonal of the box around the map of all measurements")
+      .details();
 }
 
 }  // namespace cairn

@@ -9,9 +9,11 @@
 #include <fmt/core.h>
 
 #include "cairn/evaluation/nonzeros.hpp"
+#include "cairn/evaluation/step_times.hpp"
 #include "cairn/geometry/pose.hpp"
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/runtime/plugin_call.hpp"
+#include "cairn/runtime/result_fields.hpp"
 #include "cairn/runtime/timed.hpp"
 #include "odometry_gaps.hpp"
 
@@ -168,6 +170,10 @@ PolicyRun::PolicyRun(const PolicyJob& job, const PolicySetting& setting)
   registration_->begin(
       {.recording = &data.recording, .truth = data.truth_graph ? &*data.truth_graph : nullptr});
   result_.policy = spec_text(job.policy);
+  result_.loops = data.loops;
+  result_.priors = data.priors;
+  result_.landmarks = data.landmarks;
+  result_.observations = data.observations;
 }
 
 void PolicyRun::load(const Graph& map) {
@@ -254,6 +260,90 @@ PolicyResult PolicyRun::finish(Recovery recovery) {
   result_.factor_nonzeros = nonzeros.factor;
   evaluate(*policy_, setting_.data, result_);
   return std::move(result_);
+}
+
+ResultFields<PolicyResult> PolicyResult::fields() {
+  using R = PolicyResult;
+  return ResultFields<R>()
+      .figure("policy", &R::policy,
+              "the policy with all its options, those that were found among them")
+      .figure(
+          "poses.in", [](const R& r) { return r.poses.size(); }, "poses of the recording")
+      .attribute("counts.poses")
+      .figure(
+          "poses.kept", [](const R& r) { return r.kept_poses - r.map_poses; },
+          "poses that were kept")
+      .attribute("counts.kept")
+      .figure("poses.map", &R::map_poses, "poses of the map that was continued")
+      .attribute("counts.map")
+      .figure("loops.in", &R::loops, "loop closures of the recording")
+      .attribute("counts.loops")
+      .figure("loops.proposed", &R::proposed, "pairs of poses that were to be matched")
+      .attribute("counts.proposed")
+      .figure("loops.registered", &R::registered, "those of them that matched")
+      .attribute("counts.registered")
+      .figure("loops.kept", &R::kept_loops, "loop closures in the graph")
+      .attribute("counts.kept_loops")
+      .figure("loops.false_registered", &R::false_registered,
+              "matches of places that are not the same, as far as that is known")
+      .attribute("counts.false_registered")
+      .figure("loops.false_kept", &R::false_kept, "those of them that are in the graph")
+      .attribute("counts.false_kept")
+      .figure("priors.in", &R::priors, "absolute measurements of the recording")
+      .attribute("counts.priors")
+      .figure("priors.kept", &R::kept_priors, "those of them that are in the graph")
+      .attribute("counts.kept_priors")
+      .figure("landmarks.in", &R::landmarks, "landmarks of the recording")
+      .attribute("counts.landmarks")
+      .figure("landmarks.kept", &R::kept_landmarks, "those of them that are in the graph")
+      .attribute("counts.kept_landmarks")
+      .figure("landmarks.undetermined", &R::undetermined_landmarks,
+              "of the others, those that what was measured of them does not determine")
+      .attribute("counts.undetermined_landmarks")
+      .figure("observations.in", &R::observations, "measurements of landmarks in the recording")
+      .attribute("counts.observations")
+      .figure("observations.kept", &R::kept_observations, "those of them that are in the graph")
+      .attribute("counts.kept_observations")
+      .figure("observations.nonlinear", &R::nonlinear_observations,
+              "those left out since the estimate cannot take them as linear")
+      .attribute("counts.nonlinear_observations")
+      .figure("verdicts", &R::verdicts, "how many links there were of each verdict")
+      .details()
+      .figure("chi2.final", &R::chi2, "of what was kept")
+      .label("chi2")
+      .round("{:.8g}")
+      .attribute("chi2")
+      .part("seconds", &R::seconds)
+      .figure("seconds.registration", &R::registration_seconds, "s", "matching")
+      .detail()
+      .part("steps",
+            [](const R& r) {
+              std::vector<double> seconds;
+              for (const PoseReport& pose : r.poses) seconds.push_back(pose.seconds.total);
+              return StepTimes(std::move(seconds));
+            })
+      .figure("nonzeros.information", &R::information_nonzeros,
+              "numbers in the information matrix of what was kept")
+      .detail()
+      .attribute("counts.information_nonzeros")
+      .figure("nonzeros.factor", &R::factor_nonzeros, "numbers in its factor")
+      .detail()
+      .attribute("counts.factor_nonzeros")
+      .figure(
+          "errors", [](const R& r) { return r.errors.empty() ? nullptr : &r.errors; },
+          "with the truth: errors of all poses, by the name of each recovery, or 'whole'")
+      .figure(
+          "rmse",
+          [](const R& r) -> std::optional<double> {
+            for (const char* const name : {"v2", "whole"}) {
+              if (const auto of = r.errors.find(name); of != r.errors.end())
+                return of->second.ate_translation;
+            }
+            return std::nullopt;
+          },
+          "m", "with the truth: absolute error of the trajectory, after alignment")
+      .detail()
+      .part("nees", &R::normalized);
 }
 
 }  // namespace cairn

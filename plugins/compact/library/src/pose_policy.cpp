@@ -8,6 +8,7 @@
 #include <fmt/core.h>
 
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/result_fields.hpp"
 
 namespace cairn {
 
@@ -158,6 +159,91 @@ std::optional<std::vector<double>> recovered_state(PosePolicy& policy, const Var
     return poses[static_cast<std::size_t>(step - chain->steps.begin())].state;
   }
   return std::nullopt;
+}
+
+namespace {
+
+/// What the three kinds of measurements have in common.
+template <class Report>
+ResultFields<Report> with_verdict(ResultFields<Report> fields) {
+  return fields.figure("gain", &Report::gain, "nats", "information gain")
+      .figure("innovation", &Report::innovation,
+              "squared Mahalanobis distance from what was expected")
+      .figure("verdict", &Report::verdict,
+              "linked (it is in the graph), unmatched (there is nothing to link), uninformative "
+              "(its information gain is below the threshold), inconsistent (it contradicts the "
+              "estimate, or other links), waiting (until others confirm it) or nonlinear (of a "
+              "landmark: not linear over what is not known of where the two are)");
+}
+
+}  // namespace
+
+ResultFields<LinkReport> LinkReport::fields() {
+  return with_verdict(ResultFields<LinkReport>()
+                          .figure("earlier", &LinkReport::earlier, "id of the earlier pose")
+                          .figure("later", &LinkReport::later, "id of the later pose")
+                          .figure("expected_gain", &LinkReport::expected_gain, "nats",
+                                  "information gain before it was measured"));
+}
+
+ResultFields<PriorReport> PriorReport::fields() {
+  return with_verdict(ResultFields<PriorReport>().figure("pose", &PriorReport::pose, "its id"));
+}
+
+ResultFields<LandmarkReport> LandmarkReport::fields() {
+  using R = LandmarkReport;
+  return with_verdict(
+      ResultFields<R>()
+          .figure("pose", &R::pose, "id of the pose")
+          .figure("landmark", &R::landmark, "id of the landmark")
+          .figure("factors", &R::factors, "how many measurements they were")
+          .figure("added", &R::added, "whether the landmark came with them")
+          .figure("removed", &R::removed,
+                  "whether they have left the graph with the landmark, which waits again"));
+}
+
+ResultFields<PolicySeconds> PolicySeconds::fields() {
+  using S = PolicySeconds;
+  return ResultFields<S>()
+      .figure("total", &S::total, "s", "of the policy, without matching")
+      .figure("estimate", &S::estimate, "s", "updates of the estimator")
+      .figure("covariances", &S::covariances, "s", "cross covariances")
+      .figure("search", &S::search, "s", "candidates and their gains")
+      .details();
+}
+
+ResultFields<PoseReport> PoseReport::fields() {
+  using R = PoseReport;
+  return ResultFields<R>()
+      .figure("id", &R::id, "its id")
+      .column("pose")
+      .figure("kept", &R::kept, "whether it is in the graph")
+      .figure("closed_loop", &R::closed_loop, "whether a loop was closed with it")
+      .figure("near", &R::near, "poses that the search for candidates found")
+      .figure("candidates", &R::candidates, "those near enough to be matched")
+      .figure("least_gain", &R::least_gain, "nats",
+              "the least information gain of a link to a candidate; infinite: none")
+      .figure(
+          "matched",
+          [](const R& report) {
+            return std::ranges::count_if(report.links, [](const LinkReport& link) {
+              return link.verdict != LinkVerdict::unmatched;
+            });
+          },
+          "links for which there was a match")
+      .figure(
+          "linked",
+          [](const R& report) {
+            return std::ranges::count(report.links, LinkVerdict::linked, &LinkReport::verdict);
+          },
+          "links that are in the graph")
+      .figure("links", &R::links,
+              "a LinkReport for each link, earlier ones that had been waiting among them")
+      .figure("priors", &R::priors, "a PriorReport for each, likewise")
+      .figure("landmarks", &R::landmarks, "a LandmarkReport for each")
+      .part("seconds", &R::seconds)
+      .figure("removed", &R::removed, "poses that left the graph with it")
+      .figure("notes", &R::notes, "sentences for the user");
 }
 
 }  // namespace cairn

@@ -12,6 +12,7 @@
 #include "cairn/evaluation/normalized_error.hpp"
 #include "cairn/evaluation/plausibility.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/result_fields.hpp"
 #include "cairn/runtime/timed.hpp"
 
 namespace cairn {
@@ -198,6 +199,32 @@ FoundThresholds find_thresholds(const PolicyJob& job, std::size_t count, double 
   }
   found.seconds = seconds_since(begin);
   return found;
+}
+
+ResultFields<ThresholdTrial> ThresholdTrial::fields() {
+  using T = ThresholdTrial;
+  return ResultFields<T>()
+      .figure("loop_gain_factor", &T::links, "by which the gain of links that was found is scaled")
+      .figure("pose_gain_factor", &T::poses, "by which the gain of poses that was found is scaled")
+      .figure("expected_error", &T::expected, "m", "that the covariances predict")
+      .figure("realised_error", &T::realised, "m",
+              "the same, by the distance from the estimate of everything")
+      .figure("poses", &T::poses_kept, "poses that were kept")
+      .figure("loops", &T::loops_kept, "loop closures that were kept");
+}
+
+ResultFields<FoundThresholds> FoundThresholds::fields() {
+  using F = FoundThresholds;
+  return ResultFields<F>()
+      .figure("found", &F::options, "options of the policy that were found, as texts")
+      .figure("trials", &F::trials, "each trial of thresholds in the sample")
+      .figure("chosen", &F::chosen, "the trial with the thresholds that were found, from 0")
+      .figure("noise_scale", &F::noise_scale,
+              "by how much residuals are smaller than the covariances of the measurements say")
+      .figure("expected_ate", &F::expected_ate, "m", "error of the sample with everything")
+      .figure("tolerance", &F::tolerance, "m", "what the error of a trial may be")
+      .figure("seconds", &F::seconds, "s", "finding thresholds")
+      .details();
 }
 
 }  // namespace cairn

@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include "cairn/runtime/result_fields.hpp"
 #include "dense/cholesky.hpp"
 #include "dense/eigenvalues.hpp"
 
@@ -68,6 +69,30 @@ Conservativeness conservativeness(std::span<const UncertaintyStep> steps) {
   result.marginal = static_cast<double>(marginal) / count;
   result.full = static_cast<double>(full) / count;
   return result;
+}
+
+ResultFields<UncertaintyStep> UncertaintyStep::fields() {
+  using S = UncertaintyStep;
+  return ResultFields<S>()
+      .figure("pose", &S::pose, "id of the newest pose")
+      .figure("kept", &S::kept, "poses compared")
+      .figure("marginal", &S::marginal, "norm of the compact graph's marginal covariances")
+      .figure("marginal_all", &S::marginal_all, "of those with everything")
+      .figure("full", &S::full, "norm of the compact graph's joint covariance")
+      .figure("full_all", &S::full_all, "of that with everything")
+      .figure("least_eigenvalue", &S::least_eigenvalue,
+              "of the compact covariances by those with everything; below 1: overconfident");
+}
+
+ResultFields<Conservativeness> Conservativeness::fields() {
+  using C = Conservativeness;
+  return ResultFields<C>()
+      .figure("marginal_conservative", &C::marginal,
+              "part of the steps whose marginals are at least as uncertain as with everything")
+      .figure("full_conservative", &C::full, "the same of the joint covariance")
+      .figure("least_marginal_ratio", &C::least_marginal_ratio, "compact over everything")
+      .figure("least_full_ratio", &C::least_full_ratio, "the same of the joint covariance")
+      .figure("least_eigenvalue", &C::least_eigenvalue, "the least of all steps");
 }
 
 }  // namespace cairn

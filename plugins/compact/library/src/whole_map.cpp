@@ -10,6 +10,7 @@
 #include <fmt/core.h>
 
 #include "cairn/geometry/pose.hpp"
+#include "cairn/runtime/result_fields.hpp"
 #include "cairn/runtime/timed.hpp"
 #include "cairn/update/rejected_factors.hpp"
 
@@ -150,6 +151,18 @@ WholeMap take_whole_map(const PolicyJob& job, const PolicySetting& setting,
   replace(result, all, std::move(sparse), setting);
   map.seconds = seconds_since(begin);
   return map;
+}
+
+ResultFields<WholeMap> WholeMap::fields() {
+  using W = WholeMap;
+  return ResultFields<W>()
+      .figure("kld", &W::kld, "nats",
+              "divergence of the graph from the estimate of all measurements, of the poses kept")
+      .round("{:.3g}")
+      .figure("factors.in", &W::factors_in, "factors of the recording")
+      .figure("factors.out", &W::factors_out, "factors of the compact graph")
+      .figure("seconds", &W::seconds, "s", "giving the poses kept the information of all")
+      .details();
 }
 
 }  // namespace cairn

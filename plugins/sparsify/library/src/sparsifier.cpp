@@ -5,6 +5,7 @@
 
 #include <fmt/core.h>
 
+#include "cairn/runtime/result_fields.hpp"
 #include "cairn/sparsification/selection.hpp"
 
 namespace cairn {
@@ -68,6 +69,51 @@ void apply(const Sparsification& change, Graph& graph) {
     for (const Id id : factor.variables) on.push_back(graph.find(id).value());
     graph.add_factor(factor.type, on, factor.measurement, factor.information);
   }
+}
+
+ResultFields<SparsificationSeconds> SparsificationSeconds::fields() {
+  using S = SparsificationSeconds;
+  return ResultFields<S>()
+      .figure("total", &S::total, "s", "of taking nodes out")
+      .figure("marginalize", &S::marginalize, "s", "solving and marginalising local problems")
+      .figure("covariance", &S::covariance, "s", "of neighbours in the whole graph, for fit")
+      .label("covariance in the graph")
+      .figure("topology", &S::topology, "s", "choosing factors")
+      .figure("recovery", &S::recovery, "s", "computing them")
+      .details();
+}
+
+ResultFields<RefusedNode> RefusedNode::fields() {
+  return ResultFields<RefusedNode>()
+      .figure("node", &RefusedNode::node, "its id")
+      .figure("reason", &RefusedNode::reason, "why it could not leave");
+}
+
+ResultFields<SparsificationNote> SparsificationNote::fields() {
+  return ResultFields<SparsificationNote>()
+      .figure("text", &SparsificationNote::text, "a sentence")
+      .figure("problems", &SparsificationNote::problems, "how many problems it is about");
+}
+
+ResultFields<Sparsification> Sparsification::fields() {
+  using S = Sparsification;
+  return ResultFields<S>()
+      .figure("problems.count", &S::problems, "sets of neighbours that got new factors")
+      .attribute("problems")
+      .figure("problems.mean_blanket", &S::mean_blanket, "neighbours in a set, on average")
+      .round("{:.2f}")
+      .attribute("mean_blanket")
+      .figure("problems.largest_blanket", &S::largest_blanket, "neighbours in a set, at most")
+      .attribute("largest_blanket")
+      .figure("problems.kld", &S::kld, "nats", "divergences of all sets, added up")
+      .attribute("kld_of_problems")
+      .figure("problems.not_converged", &S::not_converged, "sets whose factors have not converged")
+      .attribute("not_converged")
+      .figure("problems.notes", &S::notes, "what should be known of some of the sets")
+      .attribute("notes_on_problems")
+      .figure("refused", &S::refused, "chosen variables that could not leave")
+      .part("seconds", &S::seconds)
+      .details();
 }
 
 }  // namespace cairn

@@ -12,6 +12,7 @@
 
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
+#include "cairn/runtime/result_fields.hpp"
 #include "cairn/runtime/timed.hpp"
 #include "cairn/sparsification/connectivity.hpp"
 #include "whole_graph.hpp"
@@ -127,6 +128,63 @@ SparsifyEdgesResult sparsify_edges(const Graph& graph, const SparsifyEdgesJob& j
   whole.chi2_after = optimize(whole.sparse, "the sparse graph");
   if (job.measure && !whole.interrupted) measure(original, *solver, job, result);
   return result;
+}
+
+ResultFields<Connectivity> Connectivity::fields() {
+  using C = Connectivity;
+  return ResultFields<C>()
+      .figure("full", &C::full, "with all factors")
+      .figure("sparse", &C::sparse, "with those that stay")
+      .figure("bound", &C::bound, "that no choice of as many exceeds")
+      .details();
+}
+
+ResultFields<SparsifyEdgesResult> SparsifyEdgesResult::fields() {
+  using R = SparsifyEdgesResult;
+  const auto by = [](EdgeWeight weight) {
+    return [weight](const R& r) { return r.connectivity[static_cast<std::size_t>(weight)]; };
+  };
+  return ResultFields<R>()
+      .part(&R::whole)
+      .without("problems")
+      .without("refused")
+      .without("nonzeros")
+      .without("conservative_margin")
+      .without("seconds")
+      .without("redirected")
+      .without("dropped")
+      .without("rmse_full")
+      .without("steps")
+      .figure(
+          "loops.in", [](const R& r) { return r.closures.candidates.size(); },
+          "loop closures that might leave")
+      .figure(
+          "loops.kept",
+          [](const R& r) {
+            return r.closures.candidates.size() - r.whole.change.removed_factors.size();
+          },
+          "those of them that stay")
+      .figure(
+          "backbone.factors", [](const R& r) { return r.closures.backbone.size(); },
+          "factors of the spanning forest that stays")
+      .figure(
+          "backbone.odometry", [](const R& r) { return r.closures.odometry; },
+          "those of them between poses that follow each other")
+      .figure(
+          "backbone.components", [](const R& r) { return r.closures.components; },
+          "sets of variables that relative factors join")
+      .figure(
+          "kld_bound", [](const R& r) { return r.choice.kld_bound.value_or(std::nan("")); }, "nats",
+          "divergence of covariances that no choice of as many is below")
+      .part("connectivity.rotation", by(EdgeWeight::rotation))
+      .part("connectivity.translation", by(EdgeWeight::translation))
+      .figure(
+          "seconds.total", [](const R& r) { return r.whole.select_seconds; }, "s",
+          "choosing what leaves")
+      .figure(
+          "seconds.select", [](const R& r) { return r.whole.select_seconds; }, "s",
+          "choosing what leaves")
+      .details();
 }
 
 }  // namespace cairn

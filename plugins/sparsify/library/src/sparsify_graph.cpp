@@ -11,11 +11,13 @@
 
 #include <fmt/core.h>
 
+#include "cairn/evaluation/step_times.hpp"
 #include "cairn/geometry/pose.hpp"
 #include "cairn/geometry/pose_chain.hpp"
 #include "cairn/graph/gauge.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
+#include "cairn/runtime/result_fields.hpp"
 #include "cairn/runtime/timed.hpp"
 #include "cairn/solve/estimator.hpp"
 #include "cairn/update/recorded_graph.hpp"
@@ -422,6 +424,59 @@ SparsifyResult sparsify_online(const Graph& recording, const SparsifyJob& job,
   }
   return call_plugin([&] { return fmt::format("estimator '{}'", job.estimator); },
                      [&] { return OnlineRun(recording, job, setting).run(); });
+}
+
+ResultFields<SparsifyResult> SparsifyResult::fields() {
+  using R = SparsifyResult;
+  const auto online = [](auto R::*member) {
+    return
+        [member](const R& r) { return r.steps.empty() ? std::nullopt : std::optional(r.*member); };
+  };
+  return ResultFields<R>()
+      .figure(
+          "status", [](const R& r) { return r.interrupted ? Status::interrupted : r.status; },
+          "of the first optimisation that has not converged, or converged")
+      .figure("poses.in", &R::variables_before, "variables of the original graph")
+      .figure(
+          "poses.kept", [](const R& r) { return r.sparse.variable_count(); },
+          "variables of the sparse graph")
+      .figure("factors.in", &R::factors_before, "factors of the original graph")
+      .figure(
+          "factors.out", [](const R& r) { return r.sparse.factor_count(); },
+          "factors of the sparse graph")
+      .part(&R::change)
+      .part([](const R& r) {
+        constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+        return r.error.value_or(
+            SparsificationError{kUnknown, kUnknown, kUnknown, kUnknown, kUnknown});
+      })
+      .part("nonzeros.before", &R::nonzeros_before)
+      .part("nonzeros.after", &R::nonzeros_after)
+      .figure("conservative_margin", &R::conservative_margin,
+              "the smallest eigenvalue of the original information less the sparse one; from 0 on "
+              "the sparse graph is conservative")
+      .round("{:.3g}")
+      .figure("chi2.before", &R::chi2_before, "of the original graph at its minimum")
+      .attribute("initial_chi2")
+      .figure("chi2.after", &R::chi2_after, "of the sparse graph at its minimum")
+      .attribute("chi2")
+      .figure("seconds.select", &R::select_seconds, "s", "choosing what leaves")
+      .figure("redirected", online(&R::redirected),
+              "online: factors on nodes that had left, redirected to others")
+      .optional()
+      .figure("dropped", online(&R::dropped), "online: factors on nodes that had left, dropped")
+      .optional()
+      .figure("rmse_full", online(&R::rmse_full), "m",
+              "online: distance from the minimum of all factors as they arrived")
+      .round("{:.3g}")
+      .optional()
+      .part("steps",
+            [](const R& r) {
+              return r.steps.empty() ? std::nullopt : std::optional(StepTimes(r.steps));
+            })
+      .optional()
+      .figure("notes", &R::notes, "sentences for the user")
+      .details();
 }
 
 }  // namespace cairn

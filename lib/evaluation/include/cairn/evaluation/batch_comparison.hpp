@@ -9,6 +9,7 @@
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/api.hpp"
+#include "cairn/runtime/result_fields_fwd.hpp"
 #include "cairn/solve/estimator.hpp"
 #include "cairn/solve/optimizer.hpp"
 #include "cairn/types/loss.hpp"
@@ -30,6 +31,8 @@ struct CAIRN_API BatchCheck {
   /// (χ² − χ²_best) / χ²_best with the lower of the two optimisations; where that is below 10⁻⁹,
   /// which is rounding, relative to 10⁻⁹.
   double excess() const;
+
+  static ResultFields<BatchCheck> fields();
 };
 
 /// How the batch optimisations are set up.

@@ -5,6 +5,7 @@
 
 #include "cairn/graph/graph.hpp"
 #include "cairn/runtime/api.hpp"
+#include "cairn/runtime/result_fields_fwd.hpp"
 #include "cairn/solve/estimator.hpp"
 
 namespace cairn {
@@ -13,6 +14,8 @@ namespace cairn {
 struct NormalizedError {
   double squared = 0.0;  ///< eᵀ Σ⁻¹ e
   int dof = 0;           ///< its mean if the covariance is right
+
+  CAIRN_API static ResultFields<NormalizedError> fields();
 };
 
 /// The normalised estimation error squared (NEES) of a graph's poses and landmarks against their

@@ -14,6 +14,7 @@
 #include "cairn/policy/threshold_search.hpp"
 #include "cairn/policy/whole_map.hpp"
 #include "cairn/runtime/api.hpp"
+#include "cairn/runtime/result_fields_fwd.hpp"
 
 namespace cairn {
 
@@ -50,6 +51,8 @@ struct Compaction {
   int loops_left_out = 0;              ///< loop closures among them
   std::optional<MapCheck> check = {};  ///< how far the map is from that of all measurements
   std::vector<SelectionCheck::Advice> advice = {};  ///< where more could be had, or less is lost
+
+  CAIRN_API static ResultFields<Compaction> fields();
 };
 
 /// What follows a compaction; each may be empty.

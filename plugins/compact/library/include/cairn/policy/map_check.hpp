@@ -8,6 +8,7 @@
 #include "cairn/policy/estimate_of_all.hpp"
 #include "cairn/policy/policy_run.hpp"
 #include "cairn/runtime/api.hpp"
+#include "cairn/runtime/result_fields_fwd.hpp"
 
 namespace cairn {
 
@@ -21,6 +22,8 @@ struct MapCheck {
   bool is_far() const { return distance > 0.005 * extent; }
   /// "0.447 m from the map of all measurements, 0.65 % of its extent"
   CAIRN_API std::string to_string() const;
+
+  CAIRN_API static ResultFields<MapCheck> fields();
 };
 
 /// The diagonal of the box around the positions [m].

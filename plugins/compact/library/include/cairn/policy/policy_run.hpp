@@ -18,6 +18,7 @@
 #include "cairn/plugin/registry.hpp"
 #include "cairn/policy/pose_policy.hpp"
 #include "cairn/runtime/api.hpp"
+#include "cairn/runtime/result_fields_fwd.hpp"
 
 namespace cairn {
 
@@ -71,6 +72,8 @@ struct PolicyResult {
   std::map<std::string, TrajectoryError> errors;
   std::optional<NormalizedError> normalized;
   double chi2 = 0.0;
+  /// Of the recording: loop closures, absolute measurements, landmarks and measurements of these.
+  std::int64_t loops = 0, priors = 0, landmarks = 0, observations = 0;
   std::int64_t proposed = 0, registered = 0, kept_loops = 0;
   std::int64_t false_registered = 0, false_kept = 0;  ///< as far as the registration knows
   std::map<std::string, std::int64_t> verdicts;
@@ -89,6 +92,8 @@ struct PolicyResult {
   int map_poses = 0;      ///< of these, those of the map that was continued
   /// False: no match was found with that map, so that the two are not connected.
   bool located = true;
+
+  CAIRN_API static ResultFields<PolicyResult> fields();
 };
 
 /// What all runs over the same data share. Everything referred to must outlive the runs.

@@ -14,6 +14,7 @@
 #include "cairn/plugin/options.hpp"
 #include "cairn/policy/registration.hpp"
 #include "cairn/runtime/component.hpp"
+#include "cairn/runtime/result_fields_fwd.hpp"
 #include "cairn/solve/estimator.hpp"
 #include "cairn/update/recorded_graph.hpp"
 
@@ -37,6 +38,8 @@ struct LinkReport {
   double gain = 0.0;           ///< with the covariance of the measurement [nats]
   double innovation = 0.0;     ///< squared Mahalanobis distance from what was expected
   LinkVerdict verdict = LinkVerdict::unmatched;
+
+  CAIRN_API static ResultFields<LinkReport> fields();
 };
 
 /// The outcome of an absolute measurement of a pose.
@@ -46,6 +49,8 @@ struct PriorReport {
   double innovation = 0.0;  ///< squared Mahalanobis distance from what was expected
   /// `linked`: it is in the graph. `waiting`: until enough of them are there (see `offer_prior`).
   LinkVerdict verdict = LinkVerdict::uninformative;
+
+  CAIRN_API static ResultFields<PriorReport> fields();
 };
 
 /// The outcome of what a pose has measured of a landmark.
@@ -67,6 +72,8 @@ struct LandmarkReport {
   /// linear over what is not known of where the landmark is from the pose, and this one is not,
   /// such as a bearing of a landmark that is nearer than it is known.
   LinkVerdict verdict = LinkVerdict::unmatched;
+
+  CAIRN_API static ResultFields<LandmarkReport> fields();
 };
 
 /// What is measured of a landmark from one pose: factors on the two.
@@ -83,6 +90,8 @@ struct PolicySeconds {
   double search = 0.0;       ///< candidates and their gains
 
   CAIRN_API PolicySeconds& operator+=(const PolicySeconds& other);
+
+  CAIRN_API static ResultFields<PolicySeconds> fields();
 };
 
 /// The outcome of a pose, and of the links that were measured for it.
@@ -100,6 +109,8 @@ struct PoseReport {
   int removed = 0;  ///< poses that left the graph with it: see `PosePolicy::removed`
   PolicySeconds seconds;
   std::vector<std::string> notes;
+
+  CAIRN_API static ResultFields<PoseReport> fields();
 };
 
 /// Decides online which poses of a trajectory are kept and which loop closures are used.

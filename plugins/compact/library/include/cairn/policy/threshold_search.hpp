@@ -11,6 +11,7 @@
 #include "cairn/policy/policy_run.hpp"
 #include "cairn/policy/pose_policy.hpp"
 #include "cairn/runtime/api.hpp"
+#include "cairn/runtime/result_fields_fwd.hpp"
 
 namespace cairn {
 
@@ -22,6 +23,8 @@ struct ThresholdTrial {
   std::int64_t poses_kept = 0, loops_kept = 0;
   OptionValues options{};  ///< with which it was run
   double error() const { return std::max(expected, realised); }
+
+  CAIRN_API static ResultFields<ThresholdTrial> fields();
 };
 
 /// √(chi2 / degrees of freedom) of an estimate: by how much residuals are smaller than the
@@ -40,6 +43,8 @@ struct FoundThresholds {
   double expected_ate = 0.0;  ///< of the sample with everything [m]
   double tolerance = 0.0;     ///< what the error of a trial may be [m]
   double seconds = 0.0;
+
+  CAIRN_API static ResultFields<FoundThresholds> fields();
 };
 
 /// Finds a policy's thresholds on the first `count` poses of a recording: the policy watches the

@@ -8,6 +8,7 @@
 #include "cairn/policy/policy_run.hpp"
 #include "cairn/policy/pose_policy.hpp"
 #include "cairn/runtime/api.hpp"
+#include "cairn/runtime/result_fields_fwd.hpp"
 #include "cairn/solve/estimator.hpp"
 
 namespace cairn {
@@ -22,6 +23,8 @@ struct UncertaintyStep {
   double full = 0.0;          ///< norm of the compact graph's joint covariance
   double full_all = 0.0;      ///< of that with everything
   double least_eigenvalue = 0.0;  ///< of Σ_all⁻¹ Σ over the poses' marginals; < 1: overconfident
+
+  CAIRN_API static ResultFields<UncertaintyStep> fields();
 };
 
 /// Whether a policy is conservative: it is compared with an estimator that takes in every pose and
@@ -47,6 +50,8 @@ struct Conservativeness {
   double full = 0.0;      ///< by that of the joint covariance
   double least_marginal_ratio = 1e300, least_full_ratio = 1e300;  ///< compact over everything
   double least_eigenvalue = 1e300;
+
+  CAIRN_API static ResultFields<Conservativeness> fields();
 };
 /// Ratios down to 1e-6 below 1 count as rounding.
 CAIRN_API Conservativeness conservativeness(std::span<const UncertaintyStep> steps);

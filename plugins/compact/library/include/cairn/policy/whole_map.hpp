@@ -12,6 +12,7 @@
 #include "cairn/policy/policy_run.hpp"
 #include "cairn/policy/selection_check.hpp"
 #include "cairn/runtime/api.hpp"
+#include "cairn/runtime/result_fields_fwd.hpp"
 #include "cairn/sparsification/sparsify_graph.hpp"
 
 namespace cairn {
@@ -31,6 +32,8 @@ struct WholeMap {
   std::int64_t factors_in = 0, factors_out = 0;  ///< of the recording and of the compact graph
   double seconds = 0.0;
   std::vector<std::string> notes = {};
+
+  CAIRN_API static ResultFields<WholeMap> fields();
 };
 
 /// Why a run of `job` cannot end in such a map, whatever is measured: matches are not those of the

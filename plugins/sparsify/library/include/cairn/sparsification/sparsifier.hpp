@@ -11,6 +11,7 @@
 #include "cairn/graph/update.hpp"
 #include "cairn/runtime/api.hpp"
 #include "cairn/runtime/component.hpp"
+#include "cairn/runtime/result_fields_fwd.hpp"
 #include "cairn/sparsification/blanket.hpp"
 #include "cairn/sparsification/recovery.hpp"
 
@@ -40,18 +41,24 @@ struct SparsificationSeconds {
   double recovery = 0.0;
 
   CAIRN_API SparsificationSeconds& operator+=(const SparsificationSeconds& other);
+
+  CAIRN_API static ResultFields<SparsificationSeconds> fields();
 };
 
 /// A node that could not be removed, and why.
 struct RefusedNode {
   Id node = 0;
   std::string reason;
+
+  CAIRN_API static ResultFields<RefusedNode> fields();
 };
 
 /// What should be known of some of the problems.
 struct SparsificationNote {
   std::string text;
   int problems = 0;  ///< to which it applies
+
+  CAIRN_API static ResultFields<SparsificationNote> fields();
 };
 
 /// The result of removing nodes from a graph. Nothing has changed yet: see `apply`.
@@ -80,6 +87,8 @@ struct Sparsification {
   CAIRN_API std::vector<std::string> note_lines() const;
   /// Adds what was done after this, on the graph that this led to.
   CAIRN_API void add(const Sparsification& later);
+
+  CAIRN_API static ResultFields<Sparsification> fields();
 };
 
 /// Takes nodes out of a graph and keeps their information, as well as a few factors can (T 4.2).

@@ -9,6 +9,7 @@
 #include "cairn/graph/graph.hpp"
 #include "cairn/plugin/options.hpp"
 #include "cairn/runtime/api.hpp"
+#include "cairn/runtime/result_fields_fwd.hpp"
 #include "cairn/sparsification/edge_selection.hpp"
 #include "cairn/sparsification/sparsify_graph.hpp"
 
@@ -30,6 +31,8 @@ struct Connectivity {
   double full = std::nan("");    ///< with all factors
   double sparse = std::nan("");  ///< with those that stay, of the same weights
   double bound = std::nan("");   ///< of any choice of as many, where the selection knows it
+
+  CAIRN_API static ResultFields<Connectivity> fields();
 };
 
 struct SparsifyEdgesResult {
@@ -37,6 +40,8 @@ struct SparsifyEdgesResult {
   LoopClosures closures;
   EdgeChoice choice;
   std::array<Connectivity, 2> connectivity;  ///< by `EdgeWeight`
+
+  CAIRN_API static ResultFields<SparsifyEdgesResult> fields();
 };
 
 /// Optimises a whole graph, removes loop closures from it (`find_loop_closures`), optimises what is

@@ -16,6 +16,7 @@
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/api.hpp"
 #include "cairn/runtime/enum_names.hpp"
+#include "cairn/runtime/result_fields_fwd.hpp"
 #include "cairn/solve/optimizer.hpp"
 #include "cairn/sparsification/sparsification.hpp"
 #include "cairn/types/loss.hpp"
@@ -81,6 +82,8 @@ struct SparsifyResult {
   Status status = Status::converged;
   bool converged = true;  ///< none of them failed
   std::vector<std::string> notes;
+
+  CAIRN_API static ResultFields<SparsifyResult> fields();
 };
 
 /// How far a sparsification is.
