@@ -14,7 +14,7 @@ FROM debian:12-slim
 COPY --from=build /cairn/build/package/packages /packages
 RUN apt-get update && \
     apt-get install -y --no-install-recommends /packages/cairn_*.deb /packages/libcairn0*.deb /packages/python3-cairn_*.deb \
-      /packages/cairn-plugin-plot_*.deb /packages/cairn-plugin-exploration_*.deb /packages/cairn-plugin-lapack_*.deb && \
+      python3-matplotlib /packages/cairn-plugin-exploration_*.deb /packages/cairn-plugin-lapack_*.deb && \
     rm -rf /packages /var/lib/apt/lists/*
 WORKDIR /data
 ENTRYPOINT ["cairn"]

@@ -53,6 +53,7 @@ class CMakeBuild(build_ext):
         for file in installed.iterdir():
             if file.is_file():
                 shutil.copy(file, package)
+        shutil.copytree(installed / "plot", package / "plot", dirs_exist_ok=True)
         for library in (installed / "lib").glob("lib*.so.*"):  # a link, lib*.so.0.1, and the file that it names
             if library.is_symlink() and not library.name.startswith("libcairn_program"):
                 shutil.copy(library, package / "lib")

@@ -182,9 +182,12 @@ get_property(packaged_names GLOBAL PROPERTY CAIRN_PACKAGED_NAMES)
 file(WRITE ${control_folder}/packages.txt "${packaged_names}")
 install(FILES ${control_folder}/packages.txt DESTINATION ${CMAKE_INSTALL_LIBDIR}/cairn COMPONENT program)
 list(TRANSFORM plugin_packages PREPEND cairn-plugin-)
-set(recommended ${plugin_packages})  # what commands need: cairn plot, cairn explore
-list(FILTER recommended INCLUDE REGEX "-(plot|exploration)$")
-list(FILTER plugin_packages EXCLUDE REGEX "-(plot|exploration)$")
+set(recommended ${plugin_packages})  # what commands need: cairn explore, cairn plot
+list(FILTER recommended INCLUDE REGEX "-exploration$")
+list(FILTER plugin_packages EXCLUDE REGEX "-exploration$")
+if(TARGET cairn_python)
+  list(APPEND recommended python3-cairn python3-matplotlib)
+endif()
 list(JOIN recommended ", " CPACK_DEBIAN_PROGRAM_PACKAGE_RECOMMENDS)
 list(JOIN plugin_packages ", " CPACK_DEBIAN_PROGRAM_PACKAGE_SUGGESTS)
 if(TARGET cairn_plugin_cholmod)  # Debian's plain BLAS is several times slower
@@ -192,9 +195,6 @@ if(TARGET cairn_plugin_cholmod)  # Debian's plain BLAS is several times slower
 endif()
 if(TARGET cairn_plugin_spqr)
   set(CPACK_DEBIAN_PLUGIN_SPQR_PACKAGE_RECOMMENDS libopenblas0-pthread)
-endif()
-if(TARGET cairn_plugin_plot)
-  set(CPACK_DEBIAN_PLUGIN_PLOT_PACKAGE_RECOMMENDS fonts-dejavu-core)
 endif()
 
 include(CPack)

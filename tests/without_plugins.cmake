@@ -27,7 +27,7 @@ without(formats g2o toro isam bal tum euroc kitti table)
 without(generate manhattan city ring sphere torus grid3d ellipse3d ellipse_n landmarks2d bundle)
 without(icp icp)
 without(initial_guess auto as_given odometry spanning_tree incremental chordal)
-without(plot svg png pdf)
+without(plot svg png pdf json)
 without(registration recorded simulated)
 without(report html)
 without(sparsify sparsify clt mi dmi ekld mixed odd l1 cliquey best closed_form fd ncfd ip pqn

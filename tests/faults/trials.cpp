@@ -168,7 +168,7 @@ Trial map_trial() {
   return made;
 }
 
-/// Where memory is short, Fontconfig ends the process by a signal, or tries again for ever.
+/// Where memory is short, it is so in Python too, whose libraries end the process by a signal.
 Trial plot_trial() {
   Trial made = trial("plot",
                      {"replay", "../inputs/graph.g2o", "--solve-every", "10", "--plot", "steps.svg",

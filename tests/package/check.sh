@@ -76,7 +76,7 @@ while IFS= read -r file; do
     grep 'libcairn' "$work/ldd" | grep -qvF "=> $root/" && fail "$what takes $(grep libcairn "$work/ldd" | tr '\n' ' ')"
   }
   case ${what%%/*} in
-    cairn | libcairn* | python3-cairn | cairn-plugin-plot | cairn-plugin-lapack | cairn-plugin-exploration)
+    cairn | libcairn* | python3-cairn | cairn-plugin-lapack | cairn-plugin-exploration)
       grep -qE 'lib(cholmod|spqr|ceres|umfpack|klu)' "$work/ldd" && fail "$what needs a library under the GPL"
       ;;
   esac

@@ -48,13 +48,18 @@ run install /packages/cairn_*.deb /packages/libcairn0*.deb
 run cairn generate manhattan:poses=1000 -o graph.g2o --ground-truth truth.g2o --seed 7
 run cairn optimize graph.g2o -o best.g2o
 run cairn evaluate best.g2o truth.g2o
-for other in libcholmod3 libspqr2 libceres3 libcairo2 libopencv-core406; do
+for other in libcholmod3 libspqr2 libceres3 libopencv-core406 python3-cairn python3-matplotlib; do
   ! installed $other || fail "the program brings $other with it"
 done
 status=0
 cairn optimize graph.g2o --linear-solver cholmod >out 2>&1 || status=$?
 ((status == 5)) || fail "cholmod without its package: $status"
 grep -q 'it is in the Debian package cairn-plugin-cholmod' out || fail "its package is not named: $(cat out)"
+cat out
+status=0
+cairn plot best.g2o -o best.svg >out 2>&1 || status=$?
+((status == 5)) || fail "cairn plot without Python: $status"
+tr '\n' ' ' <out | tr -s ' ' | grep -q 'apt install python3-matplotlib python3-cairn' || fail "what plots need is not named: $(cat out)"
 cat out
 zcat /usr/share/man/man1/cairn-optimize.1.gz | grep -q 'linear' || fail "no manual page of cairn optimize"
 cairn complete -- optimize --linear-solver b | grep -q '^block_cholesky' || fail "no completion"
@@ -63,11 +68,13 @@ printf '\n==== the Python package\n'
 run install /packages/python3-cairn_*.deb
 run python3 -c 'import cairn; graph, truth = cairn.generate("sphere", seed=1); print(cairn.optimize(graph, "dogleg")); print(cairn.evaluate(graph, truth))'
 [[ -n $(find /usr/lib/python3/dist-packages/cairn -name '*.pyc') ]] || fail "nothing was compiled for Python"
+run install python3-matplotlib
+run cairn plot best.g2o -o best.svg --quiet
+run python3 -c 'import cairn; graph, _ = cairn.generate("ring", seed=1); cairn.plot.trajectory(graph).figure.savefig("ring.pdf")'
 
 printf '\n==== plugins of their own packages\n'
 run install /packages/cairn-plugin-*.deb
 run cairn bench graph.g2o --optimizer levenberg_marquardt,ceres --linear-solver block_cholesky,cholmod,spqr,eigen --repeat 1 --quiet
-run cairn plot best.g2o -o best.svg --quiet
 run cairn explore @rooms --until distance=20 --seed 3 --quiet
 
 printf '\n==== a plugin and a program of somebody else\n'

@@ -27,14 +27,15 @@ def test_a_wheel_gets_module_libraries_and_plugins_once(tmp_path):
     installed, package = tmp_path / "installed", tmp_path / "package"
     (installed / "lib" / "cairn" / "report").mkdir(parents=True)
     (installed / "lib" / "cmake").mkdir()
-    for name in ["__init__.py", "_cairn.so", "lib/libcairn.so.0.1.0", "lib/cairn/dogleg.so", "lib/cairn/dogleg.json", "lib/cairn/report/page.html"]:
+    (installed / "plot").mkdir()
+    for name in ["__init__.py", "_cairn.so", "plot/__main__.py", "lib/libcairn.so.0.1.0", "lib/cairn/dogleg.so", "lib/cairn/dogleg.json", "lib/cairn/report/page.html"]:
         (installed / name).write_text(name)
     (installed / "lib" / "libcairn.so.0.1").symlink_to("libcairn.so.0.1.0")
     (installed / "lib" / "libcairn.so").symlink_to("libcairn.so.0.1")
     setup_module_of_the_project().CMakeBuild.take_over(installed, package)
     files = {str(file.relative_to(package)) for file in package.rglob("*") if file.is_file()}
     assert files == {
-        "__init__.py", "_cairn.so", "lib/libcairn.so.0.1", "lib/cairn/dogleg.so", "lib/cairn/dogleg.json",
+        "__init__.py", "_cairn.so", "plot/__main__.py", "lib/libcairn.so.0.1", "lib/cairn/dogleg.so", "lib/cairn/dogleg.json",
         "lib/cairn/report/page.html",
     }
     assert not (package / "lib" / "libcairn.so.0.1").is_symlink()

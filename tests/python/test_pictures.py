@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import html
 import importlib.util
+import json
 import os
 import re
 import subprocess
@@ -15,6 +16,10 @@ from graphs import from_dense
 
 needs_matplotlib = pytest.mark.skipif(
     not importlib.util.find_spec("matplotlib"), reason="there is no module matplotlib (python3-matplotlib)"
+)
+
+needs_plots = pytest.mark.skipif(
+    "svg" not in cairn.components("picture") or not importlib.util.find_spec("matplotlib"), reason="no plugin draws SVG, or no matplotlib"
 )
 
 
@@ -67,8 +72,8 @@ def test_what_has_no_positions_cannot_be_drawn():
         cairn.Graph().plot()
 
 
-@pytest.mark.skipif("svg" not in cairn.components("picture"), reason="no plugin draws SVG")
-def test_plugins_draw_too():
+@needs_plots
+def test_files_are_drawn():
     graph, truth = cairn.generate("manhattan", seed=1, poses=200)
     picture = cairn.draw({"drifted": graph, "truth": truth}, "svg", width=400, height=300)
     assert picture.startswith(b"<?xml") and b'viewBox="0 0 300 225"' in picture  # points
@@ -77,21 +82,25 @@ def test_plugins_draw_too():
         cairn.draw({"graph": graph}, "jpeg")
 
 
-def drawn_numbers(picture):
-    """Those of the paths of an SVG, in the order in which they are drawn [pt]."""
-    paths = re.findall(rb' d="([^"]*)"', picture)
-    return np.array([float(number) for path in paths for number in re.findall(rb"-?[0-9.]+", path)])
+def drawn_numbers(ax):
+    """Those of all lines, in the order in which they are drawn [m]."""
+    return np.concatenate([np.array(line.get_data()).T for line in sorted(ax.get_lines(), key=lambda line: line.get_zorder())])
 
 
-def ellipses_of(picture):
-    """The corners (24, 2) of each closed path in the thin stroke of covariances [pt]."""
-    thin = [path for path in re.findall(rb"<path [^>]*stroke-width:0\.7;[^>]*>", picture)]
-    longest = max(thin, key=len)
-    loops = re.search(rb' d="([^"]*)"', longest).group(1).split(b"M ")[1:]
-    return np.array([[float(x) for x in re.findall(rb"-?[0-9.]+", loop)][:48] for loop in loops]).reshape(len(loops), 24, 2)
+def ellipses_of(ax):
+    """The corners (24, 2) of each ellipse in the thin stroke of covariances [m]."""
+    thin = max((line for line in ax.get_lines() if line.get_linewidth() == 0.7 * 0.75), key=lambda line: len(line.get_xdata()))
+    return np.array(thin.get_data()).T.reshape(-1, 26, 2)[:, :24]
 
 
-@pytest.mark.skipif("svg" not in cairn.components("picture"), reason="no plugin draws SVG")
+def scenes_of(numbers):
+    """The positions of each estimate in what `cairn plot` draws."""
+    from cairn.plot import _numbers
+
+    return [_numbers.scene(graph) for graph in json.loads(numbers)["album"]["graphs"]]
+
+
+@needs_plots
 @pytest.mark.parametrize("name, pose, motion", [
     (dict(generator="manhattan", poses=200), cairn.Pose2, cairn.Pose2(30, -10, 2)),
     (dict(generator="sphere", turns=3), cairn.Pose3, cairn.Pose3.exp([5, -30, 8, 0.4, -1, 0.3])),
@@ -100,45 +109,47 @@ def test_an_estimate_is_aligned_to_the_truth(name, pose, motion, tmp_path):
     graph, truth = cairn.generate(seed=1, **name)
     turned = graph.copy()
     turned.set_states(pose, [(motion * pose.from_state(row)).state for row in graph.states(pose)])
-    expected = drawn_numbers(cairn.draw({"estimate": graph}, truth=truth))
-    aligned = drawn_numbers(cairn.draw({"estimate": turned}, truth=truth))
-    assert_allclose(aligned, expected, atol=0.02)
+    expected = drawn_numbers(cairn.plot.trajectory({"estimate": graph}, truth=truth))
+    aligned = drawn_numbers(cairn.plot.trajectory({"estimate": turned}, truth=truth))
+    assert_allclose(aligned, expected, atol=1e-4)
     truth.write(tmp_path / "truth.g2o")
     for name, each in [("plain", graph), ("turned", turned)]:
         each.write(tmp_path / "map.g2o")
-        command = [os.environ["CAIRN_PROGRAM"], "plot", "map.g2o", "--truth", "truth.g2o", "-o", f"{name}.svg", "--quiet"]
+        command = [os.environ["CAIRN_PROGRAM"], "plot", "map.g2o", "--truth", "truth.g2o", "-o", f"{name}.json", "--quiet"]
         subprocess.run(command, cwd=tmp_path, check=True)
-    assert_allclose(drawn_numbers((tmp_path / "turned.svg").read_bytes()), drawn_numbers((tmp_path / "plain.svg").read_bytes()), atol=0.02)
-    apart = drawn_numbers(cairn.draw({"estimate": turned, "truth": truth}))
-    assert len(apart) != len(expected) or np.abs(apart - expected).max() > 10
+    [of_turned], [of_plain] = (scenes_of((tmp_path / f"{name}.json").read_bytes()) for name in ("turned", "plain"))
+    for one, other in zip(of_turned.estimates, of_plain.estimates):
+        assert_allclose(one.positions, other.positions, atol=1e-3)
+    apart = scenes_of(cairn.draw({"estimate": turned, "truth": truth}, "json"))
+    assert np.abs(apart[0].estimates[0].positions - of_plain.estimates[0].positions).max() > 5
 
 
-@pytest.mark.skipif("svg" not in cairn.components("picture"), reason="no plugin draws SVG")
+@needs_plots
 def test_covariances_are_drawn_as_ellipses():
     graph, truth = cairn.generate("manhattan", seed=1, poses=60)
     cairn.optimize(graph)
     ids = graph.ids(cairn.Pose2)[1:]
     covariances = {"estimate": (ids, cairn.marginals(graph, ids))}
-    three = ellipses_of(cairn.draw({"estimate": graph}, covariances=covariances))
+    three = ellipses_of(cairn.plot.trajectory({"estimate": graph}, covariances=covariances))
     assert len(three) == len(ids)
-    # Each has the shape of the covariance of the position in the world: R S R^T, y upwards. The picture has a scale of its own.
-    headings = graph.states(cairn.Pose2)[1:, 2]
-    scales = []
-    for corners, heading, block in zip(three, headings, covariances["estimate"][1]):
+    # Each has the shape of the covariance of the position in the world: R S R^T.
+    states = graph.states(cairn.Pose2)[1:]
+    for corners, (x, y, heading), block in zip(three, states, covariances["estimate"][1]):
         turn = np.array([[np.cos(heading), -np.sin(heading)], [np.sin(heading), np.cos(heading)]])
         world = turn @ block[:2, :2] @ turn.T
-        deviation = (corners - corners.mean(0)) * [1, -1]
-        scales.append(np.sqrt((deviation**2).sum(0) / (24 / 2 * 9 * np.diagonal(world))))  # of 24 corners at 3 sigma
-    scales = np.array(scales)[20:]  # the first are smaller than the digits of the file
-    assert_allclose(scales, np.median(scales), rtol=0.05)
-    six = ellipses_of(cairn.draw({"estimate": graph}, covariances=covariances, ellipses=1))
-    assert np.ptp(six[-1], axis=0).max() < np.ptp(three[-1], axis=0).max() / 2.5
+        deviation = corners - [x, y]
+        assert_allclose(deviation.T @ deviation / (24 / 2 * 9), world, rtol=0.01, atol=1e-6)  # of 24 corners at 3 sigma
+    one = ellipses_of(cairn.plot.trajectory({"estimate": graph}, covariances=covariances, ellipses=1))
+    assert_allclose(np.ptp(one, axis=1), np.ptp(three, axis=1) / 3, atol=1e-6)
+    picture = cairn.draw({"estimate": graph}, covariances=covariances)
+    assert b'<g id="covariances">' in picture and b"<!-- covariance, 3 " in picture
     sphere, _ = cairn.generate("sphere", seed=1, turns=3)
     ids = sphere.ids(cairn.Pose3)[1:]
-    assert len(ellipses_of(cairn.draw({"e": sphere}, covariances={"e": (ids, cairn.marginals(sphere, ids))}))) == len(ids)
+    in_space = cairn.plot.trajectory({"e": sphere}, covariances={"e": (ids, cairn.marginals(sphere, ids))})
+    assert len(ellipses_of(in_space)) == len(ids)
 
 
-@pytest.mark.skipif("svg" not in cairn.components("picture"), reason="no plugin draws SVG")
+@needs_plots
 def test_covariances_that_do_not_fit_are_refused():
     graph, _ = cairn.generate("manhattan", seed=1, poses=20)
     for given, message in [

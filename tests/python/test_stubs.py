@@ -15,13 +15,16 @@ import cairn
 @pytest.mark.skipif(not importlib.util.find_spec("mypy"), reason="there is no module mypy (package mypy)")
 def test_stubs_and_module_agree(tmp_path):
     environment = dict(os.environ, MYPYPATH=str(Path(cairn.__file__).parent.parent))
+    settings = tmp_path / "mypy.ini"
+    settings.write_text("[mypy]\nignore_missing_imports = True\n")  # matplotlib of Debian 12 has no types
     ended = subprocess.run(
-        [sys.executable, "-m", "mypy.stubtest", "cairn", "--ignore-missing-stub", "--concise"],
+        [sys.executable, "-m", "mypy.stubtest", "cairn", "--ignore-missing-stub", "--concise", "--mypy-config-file", str(settings)],
         capture_output=True, text=True, cwd=tmp_path, env=environment,
     )
     # What pybind11 makes has a metaclass, and where nothing makes an object, a constructor that refuses.
     harmless = ("metaclass differs", '.__init__ is inconsistent, stub does not have *args argument "args"')
-    found = [line for line in ended.stdout.splitlines() if not line.endswith(harmless)]
+    own = "cairn.plot._"  # these have types of their own, no stubs
+    found = [line for line in ended.stdout.splitlines() if not line.endswith(harmless) and not line.startswith(own)]
     assert not found and ended.returncode in (0, 1), ended.stdout + ended.stderr
 
 

@@ -14,9 +14,10 @@ a `FileNotFoundError`, a `KeyError` (of ids) or a `ValueError` as well where it 
 from . import _cairn
 from ._cairn import *  # noqa: F401,F403  what the module has: that of each subject which was built
 from ._cairn import __version__
-from . import _plot  # noqa: E402,F401  plots are methods of Graph
+from . import plot
+from ._plot import draw  # instead of the module's, which draws nothing by matplotlib
 
-__all__ = [*sorted(_name for _name in dir(_cairn) if not _name.startswith("_")), "__version__"]
+__all__ = [*sorted(_name for _name in dir(_cairn) if not _name.startswith("_")), "plot", "__version__"]
 
 # They are the package's, wherever they are compiled.
 for _name in __all__:

@@ -5,6 +5,8 @@ from typing import Any, Callable, Dict, Iterable, List, Optional, Protocol, Sequ
 import numpy as np
 import numpy.typing as npt
 
+from . import plot as plot
+
 _Floats = npt.NDArray[np.float64]
 _Integers = npt.NDArray[np.int64]
 _Value = Union[Pose2, Pose3, Point2, Point3]

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Pictures of graphs: by matplotlib, and in notebooks."""
 import html
+import json
 
 import numpy as np
 
-from ._cairn import Error, Graph, components, draw, kinds
+from ._cairn import Error, Graph, components, kinds
+from ._cairn import draw as _draw
 
 
 def _positions(graph, tag):
@@ -62,6 +64,30 @@ def _repr_html_(self):
         return None
     page = draw({"graph": self}, "html").decode()
     return f'<iframe srcdoc="{html.escape(page)}" width="100%" height="600" frameborder="0"></iframe>'
+
+
+def draw(graphs, picture="svg", *, truth=None, covariances=None, **options):
+    """Graphs drawn: the bytes of a file.
+
+    graphs: a Graph for each name, {"estimate": graph, "truth": other}; those with the same ids are laid over each other, the
+        first of those without factors as the truth.
+    picture: "svg", "png" or "pdf", drawn by matplotlib, "json", the numbers of that, or "html" (the page of cairn view); a
+        name of `cairn.components("picture")`, whose options are further keyword arguments.
+    truth: a Graph of where the poses truly are; each estimate is aligned to it, as `cairn.evaluate` does.
+    covariances: for a name the ids of variables and their covariances, {"estimate": (ids, cairn.marginals(graph, ids))}, drawn as
+        ellipses of their positions, of ellipsoids in space the outlines, of 3 standard deviations unless ellipses= says another number.
+    """
+    kind, colon, given = picture.partition(":") if isinstance(picture, str) else (picture, "", "")
+    if kind not in ("svg", "png", "pdf") or kind not in components("picture"):
+        return _draw(graphs, picture, truth=truth, covariances=covariances, **options)
+    numbers = json.loads(_draw(graphs, f"json{colon}{given}", truth=truth, covariances=covariances, **options))
+    from .plot._numbers import PlotError
+    from .plot._page import picture as drawn
+
+    try:
+        return drawn(numbers, kind)
+    except PlotError as error:
+        raise Error(str(error)) from None
 
 
 Graph.plot = plot

@@ -153,15 +153,7 @@ py::bytes draw(const py::dict& graphs, const std::string& picture, const py::obj
 void bind_pictures(py::module_& module) {
   module.def("draw", &draw, py::arg("graphs"), py::arg("picture") = "svg", py::kw_only(),
              py::arg("truth") = py::none(), py::arg("covariances") = py::none(),
-             R"(Graphs drawn by a plugin: the bytes of a file.
-
-graphs: a Graph for each name, {"estimate": graph, "truth": other}; those with the same ids are laid over each other, the
-    first of those without factors as the truth.
-picture: a name of `cairn.components("picture")`, such as "svg", "png", "pdf" or "html" (the page of cairn view), whose
-    options are further keyword arguments.
-truth: a Graph of where the poses truly are; each estimate is aligned to it, as `cairn.evaluate` does.
-covariances: for a name the ids of variables and their covariances, {"estimate": (ids, cairn.marginals(graph, ids))}, drawn as
-    ellipses of their positions, of ellipsoids in space the outlines, of 3 standard deviations unless ellipses= says another number.)");
+             "Graphs drawn by a plugin: the bytes of a file.");
 }
 
 }  // namespace cairn::python

@@ -39,8 +39,7 @@ std::string picture_format(const std::string& file, Session& session) {
   const std::vector<std::string> names = session.registry().names(Picture::kKind);
   if (names.empty()) {
     throw with_problems(
-        "no plugin draws reports or plots: neither 'plot', which is built where Cairo is, nor "
-        "'report', the page, was found",
+        "no plugin draws reports or plots: neither 'plot' nor 'report', the page, was found",
         session);
   }
   if (std::find(names.begin(), names.end(), ending) == names.end()) {
@@ -62,7 +61,7 @@ void check_makes_pages(const std::string& remedy, Session& session) {
 }
 
 void check_picture(const std::string& file, Session& session) {
-  picture_format(file, session);
+  session.registry().make<Picture>(ComponentSpec{picture_format(file, session), {}});
   check_file(file, session);
 }
 

@@ -11,6 +11,7 @@
 #include "cairn/program/picture_files.hpp"
 #include "cairn/program/table.hpp"
 #include "cairn/report/scene.hpp"
+#include "cairn/runtime/error.hpp"
 #include "explore_comparison_report.hpp"
 
 namespace cairn::app {
@@ -74,8 +75,12 @@ std::string chart(const NumberTable& table, const std::string& x, const std::str
 }
 
 std::string charts(const ExploreComparison& comparison, Session& session) {
-  if (!session.registry().has(Picture::kKind, "svg"))
-    return "<p>Curves need the plugin <code>plot</code>, which this build lacks.</p>\n";
+  try {
+    session.registry().make<Picture>("svg");
+  } catch (
+      const Error& error) {  // the runs are done, and the rest of the page says what they found
+    return fmt::format("<p>Without curves: {}</p>\n", escaped(error.what()));
+  }
   std::string text;
   const NumberTable distance = curves_over_distance(comparison);
   for (const char* quantity : {"map_entropy", "trajectory_entropy", "coverage"})

@@ -140,7 +140,8 @@ void check_columns(const PlotOptions& options, Session& session) {
 
 ComponentSpec picture_spec(const PlotOptions& options, const std::string& output,
                            Session& session) {
-  check_picture(output, session);
+  picture_format(output, session);
+  check_file(output, session);
   check_columns(options, session);
   ComponentSpec picture{picture_format(output, session), {}};
   if (picture.name == "html") return picture;

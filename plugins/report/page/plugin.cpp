@@ -5,18 +5,33 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include <fmt/core.h>
 
+#include "album_json.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
-#include "report.hpp"
 
 void cairn_register(cairn::Registrar& registrar);
 
 namespace cairn {
 namespace {
+
+constexpr std::string_view kPlaceholder = "@CAIRN_DATA@";
+
+/// Puts the data into the page. Throws `Error` (plugin) if `page` has not exactly one place for it.
+std::string fill(std::string_view page, std::string_view data) {
+  const std::size_t place = page.find(kPlaceholder);
+  if (place == std::string_view::npos ||
+      page.find(kPlaceholder, place + 1) != std::string_view::npos) {
+    throw Error(ErrorCode::plugin,
+                fmt::format("the page to fill in must hold {} exactly once", kPlaceholder));
+  }
+  std::string filled(page);
+  return filled.replace(place, kPlaceholder.size(), data);
+}
 
 /// The page as it was built: in the folder `report` beside this plugin.
 std::filesystem::path page_file() {
@@ -40,7 +55,7 @@ class Html final : public Picture {
       throw Error(ErrorCode::plugin,
                   fmt::format("html: {} is missing; install cairn again", file.string()));
     }
-    return report::fill(read_file(file), report::page_json(album));
+    return fill(read_file(file), report::album_json(album, report::Frames::all));
   }
 };
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <array>
 #include <limits>
 #include <string>
 
@@ -10,52 +9,12 @@
 
 namespace cairn::plot {
 
-/// The kinds of plots.
-enum class Subject {
-  automatic,
-  trajectory,
-  convergence,
-  bars,
-  scaling,
-  sparsity,
-  steps,
-  columns,
-  map
-};
-constexpr auto enum_names(Subject) {
-  return std::to_array<EnumName<Subject>>({{Subject::automatic, "auto"},
-                                           {Subject::trajectory, "trajectory"},
-                                           {Subject::convergence, "convergence"},
-                                           {Subject::bars, "bars"},
-                                           {Subject::scaling, "scaling"},
-                                           {Subject::sparsity, "sparsity"},
-                                           {Subject::steps, "steps"},
-                                           {Subject::columns, "columns"},
-                                           {Subject::map, "map"}});
-}
-
-/// What the colour of an edge stands for: its class, or its chi2.
-enum class EdgeColour { by_class, by_residual };
-constexpr auto enum_names(EdgeColour) {
-  return std::to_array<EnumName<EdgeColour>>(
-      {{EdgeColour::by_class, "class"}, {EdgeColour::by_residual, "residual"}});
-}
-
-/// The axes of a plot of columns that are logarithmic.
-enum class Logarithmic { none, x, y, both };
-constexpr auto enum_names(Logarithmic) {
-  return std::to_array<EnumName<Logarithmic>>({{Logarithmic::none, "none"},
-                                               {Logarithmic::x, "x"},
-                                               {Logarithmic::y, "y"},
-                                               {Logarithmic::both, "xy"}});
-}
-
-/// Options of the plots `svg`, `png` and `pdf`.
+/// Options of the plots `svg`, `png` and `pdf`, and of their numbers, `json`.
 struct PlotOptions {
-  Subject what = Subject::automatic;
+  std::string what = "auto";
   int width = 900, height = 600;  ///< [px; in a PDF 1/96 inch]
-  std::string theme = "light";    ///< see `theme`
-  EdgeColour colour = EdgeColour::by_class;
+  std::string theme = "light";
+  std::string colour = "class";
   bool poses = false;     ///< of trajectories: a mark at each pose
   double ellipses = 0.0;  ///< of trajectories: covariances of positions [σ]; 0: none
   int decision = 0;       ///< of maps: at which decision of the robot, from 1; 0: at the end
@@ -63,20 +22,21 @@ struct PlotOptions {
   std::string x;
   std::string y_columns;  ///< its panels, separated by line ends: each a pattern with * and ?
   double x_max = std::numeric_limits<double>::infinity();
-  Logarithmic logarithmic = Logarithmic::none;
+  std::string logarithmic = "none";              ///< axes of a plot of columns
   std::string linear_solver = "block_cholesky";  ///< whose elimination order is drawn
 
   static auto fields() {
     using O = PlotOptions;
     return OptionFields<O>()
-        .choice(
-            "what", &O::what,
-            "what to draw; auto: columns of CSV, bars of a comparison, else the trajectory, else "
-            "convergence")
+        .choice("what", &O::what,
+                {"auto", "trajectory", "convergence", "bars", "scaling", "sparsity", "steps",
+                 "columns", "map"},
+                "what to draw; auto: columns of CSV, bars of a comparison, else the trajectory, "
+                "else convergence")
         .integer("width", &O::width, 100, 20000, "width [px; in a PDF 1/96 inch]")
         .integer("height", &O::height, 100, 20000, "height [px; in a PDF 1/96 inch]")
         .choice("theme", &O::theme, {"light", "dark"}, "colours for light or dark paper")
-        .choice("colour", &O::colour, "what colours edges")
+        .choice("colour", &O::colour, {"class", "residual"}, "what colours edges")
         .boolean("poses", &O::poses, "marks each pose of a trajectory")
         .real("ellipses", &O::ellipses, 0.0, 1000.0,
               "standard deviations of the ellipses of a trajectory's covariances, 0: none; of a "
@@ -93,7 +53,8 @@ struct PlotOptions {
         .real("x_max", &O::x_max, std::numeric_limits<double>::lowest(),
               std::numeric_limits<double>::infinity(),
               "right end of columns: rows beyond it are not drawn")
-        .choice("logarithmic", &O::logarithmic, "logarithmic axes of columns")
+        .choice("logarithmic", &O::logarithmic, {"none", "x", "y", "xy"},
+                "logarithmic axes of columns")
         .component<LinearSolver>("linear_solver", &O::linear_solver,
                                  "whose elimination order the sparsity of L has");
   }

@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "sparsity.hpp"
+
 #include <algorithm>
 #include <cstdint>
 #include <span>
+#include <utility>
+#include <vector>
 
 #include <fmt/core.h>
 
+#include "cairn/io/packed_array.hpp"
 #include "cairn/linear/block_matrix.hpp"
 #include "cairn/runtime/error.hpp"
-#include "chart.hpp"
-#include "plots.hpp"
 
 namespace cairn::plot {
 namespace {
@@ -22,21 +25,19 @@ class Grid {
   explicit Grid(int blocks)
       : blocks_(blocks),
         cells_(std::min(blocks, kMostCells)),
-        marked_(std::size_t(cells_) * cells_) {}
+        marked_(std::size_t(cells_) * std::size_t(cells_)) {}
   int cells() const { return cells_; }
   void mark(std::int32_t row, std::int32_t column) {
-    marked_[std::size_t(cell(row)) * std::size_t(cells_) + std::size_t(cell(column))] = true;
+    marked_[std::size_t(cell(row)) * std::size_t(cells_) + std::size_t(cell(column))] = 1;
   }
-  bool at(int row, int column) const {
-    return marked_[std::size_t(row) * std::size_t(cells_) + std::size_t(column)];
-  }
+  const std::vector<std::uint8_t>& marked() const { return marked_; }
 
  private:
   int cell(std::int32_t block) const {
     return static_cast<int>(std::int64_t{block} * cells_ / blocks_);
   }
   int blocks_, cells_;
-  std::vector<bool> marked_;
+  std::vector<std::uint8_t> marked_;
 };
 
 /// The blocks of variables that are not held, as the linearizer numbers them.
@@ -124,42 +125,16 @@ Pattern pattern_of_L(const BlockStructure& H, std::span<const std::int32_t> orde
   return pattern;
 }
 
-/// Cells that are marked side by side are one rectangle.
-void draw_grid(Canvas& canvas, const Theme& theme, const Box& box, const Grid& grid) {
-  const double side = std::min(box.width, box.height);
-  const Box square{box.x, box.y, side, side};
-  const double cell = side / grid.cells();
-  for (int row = 0; row < grid.cells(); ++row) {
-    for (int column = 0; column < grid.cells();) {
-      int end = column;
-      while (end < grid.cells() && grid.at(row, end)) ++end;
-      if (end > column) {
-        canvas.rectangle(
-            {square.x + column * cell, square.y + row * cell, (end - column) * cell, cell});
-      }
-      column = std::max(end, column + 1);
-    }
-  }
-  canvas.fill(theme.estimate.colour);
-  canvas.rectangle(square);
-  canvas.stroke({theme.muted, 1, {}});
-}
-
-void draw_panel(Canvas& canvas, const Theme& theme, const Box& box, const std::string& title,
-                const Pattern& pattern) {
-  Box rest = draw_heading(canvas, theme, box, title, {});
-  canvas.text(
-      rest.x, rest.y + 2,
-      fmt::format("{} blocks, {} nonzeros in the lower triangle", pattern.blocks, pattern.nonzeros),
-      kTextSize, theme.muted, Align::left, false, rest.width);
-  rest.y += 12;
-  rest.height -= 12;
-  draw_grid(canvas, theme, rest, pattern.grid);
+std::string pattern_json(const Pattern& pattern) {
+  return fmt::format(
+      R"({{"cells":{},"marked":{},"blocks":{},"nonzeros":{}}})", pattern.grid.cells(),
+      packed_json(std::span<const std::uint8_t>(pattern.grid.marked()), Packing::deflate),
+      pattern.blocks, pattern.nonzeros);
 }
 
 }  // namespace
 
-void draw_sparsity(Canvas& canvas, const Theme& theme, const Album& album, LinearSolver& solver) {
+std::string sparsity_json(const Album& album, LinearSolver& solver) {
   auto* order = query<EliminationOrder>(solver);
   if (!order) {
     throw Error(
@@ -174,10 +149,9 @@ void draw_sparsity(Canvas& canvas, const Theme& theme, const Album& album, Linea
   const BlockStructure H = structure_of(*scene);
   if (H.blocks() == 0) throw Error(ErrorCode::input, scene->name + ": all variables are constant");
   solver.analyze(H);
-  const std::vector<Box> boxes = panels(canvas, 2);
-  draw_panel(canvas, theme, boxes[0], scene->name + ": H", pattern_of_H(H));
-  draw_panel(canvas, theme, boxes[1], fmt::format("L, ordering {}", solver.stats().ordering),
-             pattern_of_L(H, order->elimination_order()));
+  return fmt::format(R"({{"name":{},"ordering":{},"H":{},"L":{}}})", json_string(scene->name),
+                     json_string(solver.stats().ordering), pattern_json(pattern_of_H(H)),
+                     pattern_json(pattern_of_L(H, order->elimination_order())));
 }
 
 }  // namespace cairn::plot

@@ -14,6 +14,7 @@
 
 #include "exploration/commands/exploration_commands.hpp"
 #include "support/http_client.hpp"
+#include "support/plots.hpp"
 
 namespace cairn::test {
 namespace {
@@ -148,7 +149,7 @@ TEST_F(ExploreRecording, EntropiesOfTheMapAreOverOneArea) {
 }
 
 TEST_F(ExploreRecording, HasCurvesToPlot) {
-  if (!Registry().has("picture", "svg")) GTEST_SKIP() << "built without plots";
+  if (!draws_plots()) GTEST_SKIP() << "nothing draws plots";
   const std::string record = folder_.file("run.jsonl"), plot = folder_.file("run.svg");
   ASSERT_EQ(explore({"--record", record}).exit_code, 0);
   const Outcome run = cairn({"plot", record, "--y", "map_entropy", "--y", "trajectory_entropy",
@@ -161,7 +162,7 @@ TEST_F(ExploreRecording, HasCurvesToPlot) {
 }
 
 TEST_F(ExploreRecording, HasMapsToPlot) {
-  if (!Registry().has("picture", "svg")) GTEST_SKIP() << "built without plots";
+  if (!draws_plots()) GTEST_SKIP() << "nothing draws plots";
   const std::string record = folder_.file("run.jsonl"), plot = folder_.file("map.svg");
   ASSERT_EQ(cairn({"explore", "@rooms", "--until", "distance=4", "--record", record}).exit_code, 0);
   const Outcome whole = cairn({"plot", record, "--what", "map", "-o", plot});

@@ -8,6 +8,7 @@
 
 #include "cairn/plugin/registry.hpp"
 #include "integration/process.hpp"
+#include "support/plots.hpp"
 
 namespace cairn::test {
 namespace {
@@ -118,7 +119,7 @@ TEST_F(Replay, StartsFromTheFileOrFromOdometry) {
 }
 
 TEST_F(Replay, DrawsTheTimeOfEachStep) {
-  if (!Registry().has("picture", "svg")) GTEST_SKIP() << "nothing draws svg";
+  if (!draws_plots()) GTEST_SKIP() << "nothing draws plots";
   const Outcome run = cairn({"replay", "@manhattan:poses=20", "--estimator", "batch", "--plot",
                              folder_.file("steps.svg"), "--quiet"});
   ASSERT_EQ(run.exit_code, 0) << run.err;

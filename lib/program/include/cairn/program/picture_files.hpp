@@ -23,7 +23,7 @@ std::string picture_format(const std::string& file, Session& session);
 /// with where plugins were looked for if none was found at all.
 void check_makes_pages(const std::string& remedy, Session& session);
 
-/// Finds out before the work whether a plot can be written there: see also `check_file`.
+/// Finds out before the work whether a plot can be drawn, and written there: see also `check_file`.
 void check_picture(const std::string& file, Session& session);
 
 /// An `Album` as the bytes of a file.

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "album_json.hpp"
+
 #include <algorithm>
 #include <limits>
 #include <span>
@@ -8,14 +10,11 @@
 
 #include "cairn/io/packed_array.hpp"
 #include "cairn/report/scene_json.hpp"
-#include "cairn/runtime/error.hpp"
 #include "cairn/runtime/version.hpp"
-#include "report.hpp"
 
 namespace cairn::report {
 namespace {
 
-constexpr std::string_view kPlaceholder = "@CAIRN_DATA@";
 // Numbers in all frames of a recording. Above the first limit they are 16-bit steps; above the
 // second frames are left out, so that a page stays below 30 MB.
 constexpr std::size_t kNumbersAsFloat = 1'500'000;
@@ -93,7 +92,7 @@ std::string recording_json(const Recording& recording, int dimension) {
                      json_string(recording.name), fmt::join(texts, ","));
 }
 
-std::string scene_json(const Scene& scene) {
+std::string scene_json(const Scene& scene, Frames frames) {
   std::vector<std::string> estimates, runs, recordings;
   for (const SceneEstimate& estimate : scene.estimates) {
     estimates.push_back(estimate_json(estimate, scene));
@@ -106,8 +105,9 @@ std::string scene_json(const Scene& scene) {
     estimates.push_back(estimate_json(none, scene));
   }
   for (const SceneRun& run : scene.runs) runs.push_back(run_json(run));
-  for (const Recording& recording : scene.recordings) {
-    recordings.push_back(recording_json(recording, scene.dimension));
+  if (frames == Frames::all) {
+    for (const Recording& recording : scene.recordings)
+      recordings.push_back(recording_json(recording, scene.dimension));
   }
   return fmt::format(R"({{"name":{},{},"estimates":[{}],"runs":[{}],"recordings":[{}]}})",
                      json_string(scene.name), structure_json(scene), fmt::join(estimates, ","),
@@ -130,9 +130,28 @@ std::string notes_json(const Album& album) {
   return fmt::format("[{}]", fmt::join(notes, ","));
 }
 
+std::string table_json(const NumberTable& table) {
+  std::vector<std::string> columns;
+  for (const NumberTable::Column& column : table.columns) {
+    std::vector<std::string> values;
+    for (const double value : column.values) values.push_back(json_number(value));
+    columns.push_back(fmt::format(R"({{"name":{},"values":[{}]}})", json_string(column.name),
+                                  fmt::join(values, ",")));
+  }
+  return fmt::format(R"({{"name":{},"columns":[{}]}})", json_string(table.name),
+                     fmt::join(columns, ","));
+}
+
+template <class Part, class Json>
+std::string list_json(const std::vector<Part>& parts, Json json) {
+  std::vector<std::string> texts;
+  for (const Part& part : parts) texts.push_back(json(part));
+  return fmt::format("[{}]", fmt::join(texts, ","));
+}
+
 }  // namespace
 
-std::string page_json(const Album& album) {
+std::string album_json(const Album& album, Frames frames) {
   std::string text =
       fmt::format(R"({{"format":"cairn-report","version":1,"kind":"{}","cairn":"{}","title":{},)",
                   album.bench.empty() ? "view" : "bench", CAIRN_VERSION, json_string(album.title));
@@ -144,32 +163,12 @@ std::string page_json(const Album& album) {
   member("machine", album.machine);
   member("build", album.build);
   member("bench", album.bench);
-  text += R"("notes":)" + notes_json(album) + R"(,"graphs":[)";
-  for (std::size_t k = 0; k < album.scenes.size(); ++k) {
-    if (k > 0) text += ',';
-    text += scene_json(album.scenes[k]);
-  }
-  text += R"(],"explorations":[)";
-  for (std::size_t k = 0; k < album.explorations.size(); ++k) {
-    if (k > 0) text += ',';
-    text += embeddable_json(album.explorations[k]);
-  }
-  return text + "]}";
-}
-
-std::string fill(std::string_view page, std::string_view data) {
-  const std::size_t place = page.find(kPlaceholder);
-  if (place == std::string_view::npos ||
-      page.find(kPlaceholder, place + 1) != std::string_view::npos) {
-    throw Error(ErrorCode::plugin,
-                fmt::format("the page to fill in must hold {} exactly once", kPlaceholder));
-  }
-  std::string filled;
-  filled.reserve(page.size() + data.size());
-  filled += page.substr(0, place);
-  filled += data;
-  filled += page.substr(place + kPlaceholder.size());
-  return filled;
+  if (!album.tables.empty()) text += R"("tables":)" + list_json(album.tables, table_json) + ",";
+  text += R"("notes":)" + notes_json(album);
+  text += R"(,"graphs":)" +
+          list_json(album.scenes, [&](const Scene& scene) { return scene_json(scene, frames); });
+  text += R"(,"explorations":)" + list_json(album.explorations, embeddable_json);
+  return text + "}";
 }
 
 }  // namespace cairn::report
