@@ -8,7 +8,6 @@
 #include <iostream>
 #include <numbers>
 #include <numeric>
-#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,10 +16,8 @@
 #include <Eigen/LU>
 
 #include "cairn/exploration/laser_scan.hpp"
-#include "cairn/graph/packed.hpp"
 #include "cairn/grid/grid_format.hpp"
 #include "cairn/plugin/registry.hpp"
-#include "cairn/policy/registration.hpp"
 #include "scan_matcher.hpp"
 #include "scan_pairs.hpp"
 #include "support/components.hpp"
@@ -77,29 +74,6 @@ Outcome outcome_of(const test::ScanPair& pair, const ScanMatcher& matcher, bool 
   return outcome;
 }
 
-/// The same by a registration that takes the guess alone, not how certain it is.
-Outcome outcome_of(const test::ScanPair& pair, Registration& registration) {
-  auto& scans = *static_cast<ScanRegistration*>(registration.ability(ScanRegistration::kAbility));
-  const std::span<const double> guess = pair.guess;
-  Outcome outcome;
-  const auto begin = std::chrono::steady_clock::now();
-  scans.take(0, pair.earlier);
-  scans.take(1, pair.later);
-  const std::vector<Factor> found = registration.match_proposed(
-      {.earlier = 0,
-       .later = 1,
-       .expected = {{guess.begin(), guess.end()}, std::vector<double>(9, 0.0)}});
-  const std::chrono::duration<double, std::milli> time = std::chrono::steady_clock::now() - begin;
-  outcome.milliseconds = time.count();
-  outcome.match.verdict = found.empty() ? icp::Verdict::no_candidate : icp::Verdict::accepted;
-  if (found.empty()) return outcome;
-  outcome.match.pose = Pose2::from_state(found[0].measurement);
-  outcome.match.covariance = unpack(found[0].information, 3).inverse();
-  outcome.error = outcome.match.pose.local(pair.truth);
-  outcome.nees = outcome.error.dot(outcome.match.covariance.inverse() * outcome.error);
-  return outcome;
-}
-
 /// The environment variable as a number, or what is given.
 int asked(const char* variable, int otherwise) {
   const char* const text = std::getenv(variable);
@@ -112,9 +86,8 @@ struct Disturbance {
   double bias = 0.0, step = 0.0;  ///< of all ranges [m]
 };
 
-/// CAIRN_ICP_PAIRS: so many pairs instead of 200; CAIRN_ICP_SEED. By `icp`, or the registration of
-/// that name.
-std::vector<Outcome> study(const std::string& floor, bool good_guess, const std::string& by = {},
+/// CAIRN_ICP_PAIRS: so many pairs instead of 200; CAIRN_ICP_SEED.
+std::vector<Outcome> study(const std::string& floor, bool good_guess,
                            const Disturbance& disturbance = {}) {
   const int pairs = asked("CAIRN_ICP_PAIRS", 200);
   const auto seed = static_cast<std::uint64_t>(asked("CAIRN_ICP_SEED", 11));
@@ -124,7 +97,6 @@ std::vector<Outcome> study(const std::string& floor, bool good_guess, const std:
   test::ScanPairs drawn(grid, seed);
   test::Sampler random(seed + 1), disturbed(seed + 2);
   const ScanMatcher matcher;
-  const auto registration = by.empty() ? nullptr : registry.make<Registration>(by);
   std::vector<Outcome> all;
   for (int k = 0; k < pairs; ++k) {
     const double sigma = random.uniform(0.01, 0.05);
@@ -136,8 +108,7 @@ std::vector<Outcome> study(const std::string& floor, bool good_guess, const std:
     for (LaserScan* const scan : {&pair.earlier, &pair.later})
       if (disturbance.bias != 0.0 || disturbance.step != 0.0)
         test::distort(*scan, disturbance.bias, disturbance.step);
-    all.push_back(registration ? outcome_of(pair, *registration)
-                               : outcome_of(pair, matcher, good_guess));
+    all.push_back(outcome_of(pair, matcher, good_guess));
     all.back().sigma = sigma;
   }
   return all;
@@ -256,9 +227,9 @@ TEST_P(FloorsStudy, WhatAPersonAndABiasDo) {
   CAIRN_NEEDS_DATA();
   CAIRN_NEEDS("grid_format", "ros");
   const std::string floor = GetParam();
-  const Summary person = summary_of(study(floor, false, {}, {.person = 0.5})),
-                bias = summary_of(study(floor, false, {}, {.bias = 0.02, .step = 0.01})),
-                bias_alone = summary_of(study(floor, false, {}, {.bias = 0.02}));
+  const Summary person = summary_of(study(floor, false, {.person = 0.5})),
+                bias = summary_of(study(floor, false, {.bias = 0.02, .step = 0.01})),
+                bias_alone = summary_of(study(floor, false, {.bias = 0.02}));
   print(floor + ", a person", person);
   print(floor + ", a bias, in steps", bias);
   print(floor + ", a bias", bias_alone);
@@ -267,26 +238,6 @@ TEST_P(FloorsStudy, WhatAPersonAndABiasDo) {
   EXPECT_LE(bias_alone.wrong, 0.03);
   EXPECT_GT(person.right, 0.1);  // in a hall wider than the range little is left in common
   EXPECT_GT(bias.right, 0.6);
-}
-
-// The same pairs by MRPT, where it is built in (CAIRN_MRPT). CAIRN_ICP_MRPT: with options, such as
-// mrpt_icp:distance=1.
-TEST_P(FloorsStudy, MoreMatchesAreRightThanOfMrptAndNoMoreWrong) {
-  CAIRN_NEEDS_DATA();
-  CAIRN_NEEDS("grid_format", "ros");
-  CAIRN_NEEDS("registration", "mrpt_icp");
-  const char* const asked_for = std::getenv("CAIRN_ICP_MRPT");
-  const std::string by = asked_for ? asked_for : "mrpt_icp";
-  for (const bool good_guess : {false, true}) {
-    const Summary ours = summary_of(study(GetParam(), good_guess)),
-                  mrpt = summary_of(study(GetParam(), good_guess, by));
-    const std::string guess = good_guess ? ", good guess" : ", poor guess";
-    print(GetParam() + guess, ours);
-    print(GetParam() + guess + ", MRPT", mrpt);
-    EXPECT_GT(ours.right, mrpt.right) << guess;
-    EXPECT_LE(ours.wrong, mrpt.wrong) << guess;
-    EXPECT_GT(mrpt.right, 0.3) << guess;  // it works
-  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Floors, FloorsStudy,
