@@ -9,9 +9,9 @@
 
 #include <fmt/core.h>
 
-#include "album_json.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "cairn/report/album_json.hpp"
 #include "cairn/runtime/error.hpp"
 
 void cairn_register(cairn::Registrar& registrar);
@@ -55,7 +55,7 @@ class Html final : public Picture {
       throw Error(ErrorCode::plugin,
                   fmt::format("html: {} is missing; install cairn again", file.string()));
     }
-    return fill(read_file(file), report::album_json(album, report::Frames::all));
+    return fill(read_file(file), album_json(album, AlbumFrames::all));
   }
 };
 

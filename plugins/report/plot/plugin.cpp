@@ -6,9 +6,9 @@
 
 #include <fmt/core.h>
 
-#include "../page/album_json.hpp"
 #include "cairn/io/packed_array.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "cairn/report/album_json.hpp"
 #include "plot_options.hpp"
 #include "python.hpp"
 #include "sparsity.hpp"
@@ -40,7 +40,7 @@ class Plot final : public Picture {
     std::string numbers = fmt::format(
         R"({{"format":"cairn-plot","version":1,"options":{},"sparsity":{},"album":{}}})",
         options_json(options_), solver_ ? plot::sparsity_json(album, *solver_) : "null",
-        report::album_json(album, report::Frames::none));
+        album_json(album, AlbumFrames::none));
     return format_ == "json" ? numbers : plot::draw_by_python(format_, numbers);
   }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "album_json.hpp"
+#include "cairn/report/album_json.hpp"
 
 #include <algorithm>
 #include <limits>
@@ -12,7 +12,7 @@
 #include "cairn/report/scene_json.hpp"
 #include "cairn/runtime/version.hpp"
 
-namespace cairn::report {
+namespace cairn {
 namespace {
 
 // Numbers in all frames of a recording. Above the first limit they are 16-bit steps; above the
@@ -58,7 +58,8 @@ std::string estimate_json(const SceneEstimate& estimate, const Scene& scene) {
   return text + "}";
 }
 
-/// Frames that fit the page: all, or as many as do, spread evenly, the first and last with them.
+/// Frames that fit the page: all, or as many as do, spread evenly, the first and last with
+/// them.
 std::vector<const Frame*> fitting(const Recording& recording) {
   std::vector<const Frame*> frames;
   if (recording.frames.empty()) return frames;
@@ -92,7 +93,7 @@ std::string recording_json(const Recording& recording, int dimension) {
                      json_string(recording.name), fmt::join(texts, ","));
 }
 
-std::string scene_json(const Scene& scene, Frames frames) {
+std::string scene_json(const Scene& scene, AlbumFrames frames) {
   std::vector<std::string> estimates, runs, recordings;
   for (const SceneEstimate& estimate : scene.estimates) {
     estimates.push_back(estimate_json(estimate, scene));
@@ -105,7 +106,7 @@ std::string scene_json(const Scene& scene, Frames frames) {
     estimates.push_back(estimate_json(none, scene));
   }
   for (const SceneRun& run : scene.runs) runs.push_back(run_json(run));
-  if (frames == Frames::all) {
+  if (frames == AlbumFrames::all) {
     for (const Recording& recording : scene.recordings)
       recordings.push_back(recording_json(recording, scene.dimension));
   }
@@ -151,7 +152,7 @@ std::string list_json(const std::vector<Part>& parts, Json json) {
 
 }  // namespace
 
-std::string album_json(const Album& album, Frames frames) {
+std::string album_json(const Album& album, AlbumFrames frames) {
   std::string text =
       fmt::format(R"({{"format":"cairn-report","version":1,"kind":"{}","cairn":"{}","title":{},)",
                   album.bench.empty() ? "view" : "bench", CAIRN_VERSION, json_string(album.title));
@@ -171,4 +172,4 @@ std::string album_json(const Album& album, Frames frames) {
   return text + "}";
 }
 
-}  // namespace cairn::report
+}  // namespace cairn

@@ -4,13 +4,14 @@
 #include <string>
 
 #include "cairn/report/scene.hpp"
+#include "cairn/runtime/api.hpp"
 
-namespace cairn::report {
+namespace cairn {
 
 /// Whether the positions of each iteration of a run are needed: pages play them, plots do not.
-enum class Frames { all, none };
+enum class AlbumFrames { all, none };
 
 /// An `Album` as docs/report.md describes it; may be embedded in a <script>.
-std::string album_json(const Album& album, Frames frames);
+CAIRN_API std::string album_json(const Album& album, AlbumFrames frames);
 
-}  // namespace cairn::report
+}  // namespace cairn
