@@ -145,14 +145,27 @@ class CurveSearch {
         room_(map, needed),
         radius_(kSpareRadius * robot.turning_radius),
         arc_(std::max(kArcCells * map.frame.resolution, radius_ * 2.0 * pi / kHeadings)),
-        goals_(goals(path, robot)) {}
+        goals_(goals(path, robot)) {
+    const int strides = 1 + static_cast<int>(arc_ / room_.stride());
+    for (const double way : {1.0, -1.0}) {
+      for (const int turn : {0, 1, -1}) {
+        const double curvature = turn / radius_;
+        Arc arc{.turn = turn, .way = way, .on = {}, .end = along_arc(curvature, way * arc_)};
+        for (int k = 1; k <= strides; ++k) {
+          arc.on.push_back(
+              along_arc(curvature, way * (arc_ * (double(k) / strides))).translation());
+        }
+        arcs_.push_back(std::move(arc));
+      }
+    }
+  }
 
   /// The points of a curve; none: there is none.
   std::optional<PlannedPath> from(const Pose2& start) {
     measure_to_goal();
     if (room_.clearance(start.translation()) >= room_.needed() && !std::isfinite(left(start)))
       return std::nullopt;
-    std::vector<bool> seen(map_.frame.size() * kHeadings, false);
+    seen_.assign(map_.frame.size() * kHeadings, false);
     nodes_.push_back({.at = start, .clearance = room_.clearance(start.translation())});
     open_.push({left(start), 0});
     std::size_t expanded = 0;
@@ -161,15 +174,14 @@ class CurveSearch {
       open_.pop();
       const Node node = nodes_[index];
       const std::optional<std::size_t> key = key_of(node.at);
-      if (!key || seen[*key]) continue;
-      seen[*key] = true;
+      if (!key || seen_[*key]) continue;
+      seen_[*key] = true;
       if (tries_goal(node, expanded++)) {
         if (const auto curve = curve_to_goal(node)) return joined(index, *curve);
         ++tries_;
       }
-      for (const double way : {1.0, -1.0}) {
-        for (const int turn : {0, 1, -1}) expand(index, turn, way);
-      }
+      const Eigen::Matrix2d R = node.at.rotation().matrix();
+      for (const Arc& arc : arcs_) expand(index, arc, R);
     }
     return std::nullopt;
   }
@@ -181,6 +193,13 @@ class CurveSearch {
     std::size_t parent = 0;
     int turn = 0;      ///< of the arc that leads here
     double way = 1.0;  ///< ahead; −1: backwards
+  };
+  /// From a pose at the origin, what the search goes on by.
+  struct Arc {
+    int turn = 0;
+    double way = 1.0;
+    std::vector<Vector2d> on;  ///< the positions that are looked at, the end among them
+    Pose2 end;
   };
   struct Goal {
     Pose2 at;
@@ -267,24 +286,30 @@ class CurveSearch {
 
   /// Whether the body can go along a curve, `at` of which is a pose for each length.
   template <class Along>
-  bool is_free(double length, double clearance, Along&& at, double* end = nullptr) const {
+  bool is_free(double length, double clearance, Along&& at) const {
     const int strides = 1 + static_cast<int>(length / room_.stride());
     for (int k = 1; k <= strides; ++k) {
       if (!room_.admits(at(length * (double(k) / strides)).translation(), clearance)) return false;
     }
-    if (end) *end = clearance;
     return true;
   }
 
-  void expand(std::size_t index, int turn, double way) {
+  /// `R`: of the heading of that node.
+  void expand(std::size_t index, const Arc& arc, const Eigen::Matrix2d& R) {
     const Node from = nodes_[index];
-    Node next{.at = {}, .clearance = from.clearance, .parent = index, .turn = turn, .way = way};
-    const double curvature = turn / radius_;
-    const auto at = [&](double length) { return from.at * along_arc(curvature, way * length); };
-    if (!is_free(arc_, from.clearance, at, &next.clearance)) return;
-    next.at = at(arc_);
+    const auto [turn, way] = std::pair(arc.turn, arc.way);
+    Node next{.at = from.at * arc.end,
+              .clearance = from.clearance,
+              .parent = index,
+              .turn = turn,
+              .way = way};
+    const std::optional<std::size_t> key = key_of(next.at);
+    if (!key || seen_[*key]) return;
     const double ahead = left(next.at);
     if (!std::isfinite(ahead)) return;
+    for (const Vector2d& on : arc.on) {
+      if (!room_.admits(from.at.translation() + R * on, next.clearance)) return;
+    }
     const double per_metre =
         1.0 + (turn != 0 ? kTurnCost : 0.0) + kAwayCost * away(next.at.translation());
     next.cost = from.cost + arc_ * per_metre * (way < 0.0 ? kBackCost : 1.0) +
@@ -385,7 +410,9 @@ class CurveSearch {
   Room room_;
   double radius_, arc_;
   std::vector<Goal> goals_;
+  std::vector<Arc> arcs_;
   std::vector<double> to_goal_;
+  std::vector<bool> seen_;  ///< cells and headings that the search has gone on from
   std::vector<Node> nodes_;
   std::priority_queue<Open, std::vector<Open>, std::greater<>> open_;
   std::size_t tries_ = 0;  ///< of curves to the goal
