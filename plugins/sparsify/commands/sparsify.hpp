@@ -8,6 +8,7 @@
 #include "cairn/program/problem_setup.hpp"
 #include "cairn/program/session.hpp"
 #include "cairn/sparsification/redirection.hpp"
+#include "cairn/sparsification/sparsify_graph.hpp"
 
 namespace cairn::app {
 
