@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
 #include <cstdio>
 #include <cstdlib>
@@ -170,7 +171,7 @@ std::string failure(const Ended& ended) {
 }  // namespace
 
 void check_python() {
-  static bool checked = false;  // once is enough: several plots may be drawn
+  static std::atomic<bool> checked = false;  // once is enough: several plots may be drawn
   if (checked) return;
   const Interpreter python = find_interpreter();
   const Ended ended = run(python, kMissing, "", "");
