@@ -112,6 +112,8 @@ void add_result(Table& table, const CompactOutcome& outcome) {
   std::string time = figures.times("seconds", {"registration"});
   if (outcome.made.found.seconds > 0.0)
     time += fmt::format(", after {} for the thresholds", figures["thresholds.seconds"]);
+  if (outcome.made.estimate_seconds > 0.0)
+    time += fmt::format(", after {} for the estimate of all measurements", figures["seconds.all"]);
   if (outcome.made.whole) time += fmt::format(", then {} for the whole", figures["whole.seconds"]);
   table.add({"time", time});
   table.add({"a pose", figures.steps("steps")});

@@ -156,9 +156,12 @@ std::string summary_text(const SparsifyCommandOptions& options, const LoadedGrap
       text += fmt::format(", from that with all measurements by {}", figures["rmse_full"]);
     table.add({"lost", text});
     if (std::isfinite(result.conservative_margin)) {
-      table.add({"margin", fmt::format("{}, the smallest eigenvalue of Λ − Λ̆ (conservative from "
-                                       "0 on)",
-                                       figures["conservative_margin"])});
+      std::string margin =
+          fmt::format("{}, the smallest eigenvalue of Λ − Λ̆ (conservative from 0 on)",
+                      figures["conservative_margin"]);
+      if (result.conservative_margin < 0.0)
+        margin += "; recovery ip, fd and ncfd take conservative=true";
+      table.add({"margin", margin});
     }
   }
   const bool fitted = result.change.seconds.covariance > 0.0;

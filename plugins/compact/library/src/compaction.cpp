@@ -8,6 +8,7 @@
 
 #include "cairn/evaluation/plausibility.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/timed.hpp"
 #include "cairn/runtime/result_fields.hpp"
 #include "cairn/text/spelling.hpp"
 
@@ -77,7 +78,10 @@ class Maker {
 
   void estimate_all() {
     if (watch_.optimising) watch_.optimising(false);
-    all_ = estimate_of_all(setting_);
+    {
+      Timed timed(out_.estimate_seconds);
+      all_ = estimate_of_all(setting_);
+    }
     if (watch_.optimising) watch_.optimising(true);
     if (!all_.why_not.empty()) {
       if (setting_.interrupted()) return;
@@ -223,6 +227,9 @@ ResultFields<Compaction> Compaction::fields() {
       .before("loops.proposed")
       .detail()
       .attribute("counts.loops")
+      .figure("seconds.all", &C::estimate_seconds, "s",
+              "of the estimate of all measurements, and of finding those that contradict it")
+      .detail()
       .part("check", &C::check)
       .part("whole", &C::whole)
       .figure("left_out", &C::left_out,

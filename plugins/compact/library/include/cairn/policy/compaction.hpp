@@ -49,6 +49,7 @@ struct Compaction {
   /// Measurements that contradict the others and have left the recording: the ids of each.
   std::vector<std::vector<Id>> left_out = {};
   int loops_left_out = 0;              ///< loop closures among them
+  double estimate_seconds = 0.0;       ///< that finding them and the estimate of all others took
   std::optional<MapCheck> check = {};  ///< how far the map is from that of all measurements
   std::vector<SelectionCheck::Advice> advice = {};  ///< where more could be had, or less is lost
 
