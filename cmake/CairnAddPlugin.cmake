@@ -17,7 +17,8 @@
 # component plugin_PACKAGE of `cmake --install`. In another project
 # - it is built in the folder of the target, or in FOLDER (which CAIRN_PLUGIN_PATH may name);
 # - `cmake --install` puts it in CAIRN_PLUGIN_INSTALL_FOLDER, by default the folder of the user's plugins, which cairn
-#   searches: $XDG_DATA_HOME/cairn/plugins, or ~/.local/share/cairn/plugins;
+#   searches: $XDG_DATA_HOME/cairn/plugins, or ~/.local/share/cairn/plugins; of a subject (CairnSubject.cmake) in
+#   lib/cairn below the prefix;
 # - where no build type is given, it is Release: without optimisation a plugin is tens of times slower;
 # - without LICENCE, the licence is "unstated".
 
@@ -33,7 +34,11 @@ macro(cairn_third_party_defaults)
   if(NOT IS_ABSOLUTE "${user_data}")
     set(user_data share)  # below the prefix
   endif()
-  set(CAIRN_PLUGIN_INSTALL_FOLDER "${user_data}/cairn/plugins" CACHE STRING
+  set(plugin_folder "${user_data}/cairn/plugins")
+  if(DEFINED CAIRN_SUBJECT)  # a library for everybody, and what goes with it: beside cairn's own
+    set(plugin_folder "${CMAKE_INSTALL_LIBDIR}/cairn")
+  endif()
+  set(CAIRN_PLUGIN_INSTALL_FOLDER "${plugin_folder}" CACHE STRING
       "Where cmake --install puts plugins of cairn; relative to the prefix if it is not absolute")
 endmacro()
 
@@ -124,6 +129,7 @@ function(cairn_add_plugin)
   if(NOT (arg_FOLDER AND COMMAND cairn_settings))  # that is one of cairn's tests
     if(TARGET cairn_plugins)  # all of cairn's own
       add_dependencies(cairn_plugins ${target})
+      set_property(GLOBAL APPEND PROPERTY CAIRN_PLUGIN_TARGETS ${target})
     endif()
     set(component Unspecified)
     if(COMMAND cairn_settings AND NOT arg_PACKAGE)
