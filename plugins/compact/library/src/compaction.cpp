@@ -8,8 +8,8 @@
 
 #include "cairn/evaluation/plausibility.hpp"
 #include "cairn/runtime/error.hpp"
-#include "cairn/runtime/timed.hpp"
 #include "cairn/runtime/result_fields.hpp"
+#include "cairn/runtime/timed.hpp"
 #include "cairn/text/spelling.hpp"
 
 namespace cairn {
