@@ -235,6 +235,7 @@ int counted_main(int argc, char** argv, char** environment) {
     FaultRecord& record = *plan.record;
     record.allocations = record.threads = record.outputs = record.failed = 0;  // of a run before
     record.started = 1;
+    ::unsetenv(kRecordVariable);  // of a program that this one starts nothing is counted
     plan.armed = true;
   }
   return real_main(argc, argv, environment);

@@ -199,7 +199,7 @@ for name, kind in vars(cairn).items():
     except TypeError:
         continue
     for member in dir(kind):
-        if member.startswith('__') and member not in ('__repr__', '__copy__', '__contains__', '__array__'):
+        if member == '_result_types' or member.startswith('__') and member not in ('__repr__', '__copy__', '__contains__', '__array__'):
             continue
         try:
             value = getattr(bare, member)

@@ -94,8 +94,7 @@ struct EvaluateOptions {
         .boolean("align_scale", &O::scale,
                  "align with a scale too, which the estimate of one camera lacks")
         .boolean("kld", &O::kld,
-                 "also the divergence D(TRUTH||ESTIMATE) of two graphs on the variables of both, "
-                 "in nats")
+                 "also D(TRUTH||ESTIMATE) of two graphs on the variables of both, in nats")
         .choice("compared_at", &O::compared_at, {"common", "minima"},
                 "for --kld both are linearised at the states of TRUTH (common), or each at its "
                 "own (minima)")
