@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "replay_report.hpp"
-#include "cairn/evaluation/step_times.hpp"
 
 #include <algorithm>
 #include <map>
@@ -119,9 +118,9 @@ ResultFields<Replay> Replay::fields() {
           "status", [](const R& r) { return status(r); }, "how the last update ended")
       .part("steps",
             [](const R& r) {
-              std::vector<double> seconds;
-              for (const ReplayStep& step : r.steps) seconds.push_back(step.seconds);
-              return StepTimes(std::move(seconds));
+              std::vector<double> times;
+              for (const ReplayStep& step : r.steps) times.push_back(step.seconds);
+              return StepTimes(std::move(times));
             })
       .figure("chi2.batch", of_all(&BatchCheck::batch),
               "of an optimisation of everything from the initial estimate")

@@ -318,9 +318,9 @@ ResultFields<PolicyResult> PolicyResult::fields() {
       .detail()
       .part("steps",
             [](const R& r) {
-              std::vector<double> seconds;
-              for (const PoseReport& pose : r.poses) seconds.push_back(pose.seconds.total);
-              return StepTimes(std::move(seconds));
+              std::vector<double> times;
+              for (const PoseReport& pose : r.poses) times.push_back(pose.seconds.total);
+              return StepTimes(std::move(times));
             })
       .figure("nonzeros.information", &R::information_nonzeros,
               "numbers in the information matrix of what was kept")
