@@ -141,7 +141,7 @@ int run_sparsify_edges(const SparsifyCommandOptions& options, Session& session) 
   LoadedGraph loaded = load_graph(options.graph, options.input, session);
   if (options.information_frame == "first") information_of_first_frame(loaded.graph);
   const InterruptGuard guard;
-  WorkProgress edges(session.common.quiet, /*at_once=*/true);
+  WorkProgress edges(session.common.quiet);
   GuessProgress guess(session.common.quiet, guard.flag());
   Stop stop = options.problem.stop;
   stop.interrupt = &guard.flag();

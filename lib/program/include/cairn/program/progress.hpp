@@ -65,19 +65,17 @@ class GuessProgress {
   std::chrono::steady_clock::time_point last_shown_ = std::chrono::steady_clock::now();
 };
 
-/// Shows how far any other work is: not with every call, so that it can be made often.
+/// Shows how far any other work is: with the first call, and then not with every one, so that it
+/// can be called often.
 class WorkProgress {
  public:
-  /// `at_once`: the first call is shown, too.
-  explicit WorkProgress(bool quiet, bool at_once = false) : line_(quiet) {
-    if (at_once) shown_ = {};
-  }
+  explicit WorkProgress(bool quiet) : line_(quiet) {}
   /// `part` of the work is done, 0 to 1; none: not known, and `text` is shown at once.
   void show(std::optional<double> part, std::string_view text);
 
  private:
   StatusLine line_;
-  std::chrono::steady_clock::time_point shown_ = std::chrono::steady_clock::now();
+  std::chrono::steady_clock::time_point shown_{};
 };
 
 }  // namespace cairn::app
