@@ -15,6 +15,9 @@ include(GNUInstallDirs)
 set(CAIRN_BINARY_FOLDER ${CMAKE_BINARY_DIR}/bin)
 set(CAIRN_LIBRARY_FOLDER ${CMAKE_BINARY_DIR}/lib)
 set(CAIRN_PLUGIN_FOLDER ${CAIRN_LIBRARY_FOLDER}/cairn)
+# Files of pkg-config find the prefix from where they are.
+file(RELATIVE_PATH CAIRN_PREFIX_FROM_PC /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
+string(REGEX REPLACE "/$" "" CAIRN_PREFIX_FROM_PC ${CAIRN_PREFIX_FROM_PC})
 
 # What every target of cairn is compiled with, plugins of third parties not included. No -march: one binary
 # serves all machines, and hot kernels choose their instruction set when they are loaded.

@@ -29,8 +29,6 @@ install(FILES ${CMAKE_CURRENT_BINARY_DIR}/cairnConfig.cmake ${CMAKE_CURRENT_BINA
         DESTINATION ${CAIRN_PACKAGE_FOLDER} COMPONENT development)
 
 # The same for pkg-config. Its prefix is found from where the file is.
-file(RELATIVE_PATH CAIRN_PREFIX_FROM_PC /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
-string(REGEX REPLACE "/$" "" CAIRN_PREFIX_FROM_PC ${CAIRN_PREFIX_FROM_PC})
 configure_file(cmake/cairn.pc.in ${CMAKE_CURRENT_BINARY_DIR}/cairn.pc @ONLY)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/cairn.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT development)
 if(TARGET cairn_c)

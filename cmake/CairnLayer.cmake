@@ -127,10 +127,8 @@ include_guard()
     list(REMOVE_ITEM below slam)
     list(TRANSFORM below PREPEND cairn_)
     list(JOIN below " " requires)
-    file(RELATIVE_PATH prefix_from_pc /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
-    string(REGEX REPLACE "/$" "" prefix_from_pc ${prefix_from_pc})
     file(CONFIGURE OUTPUT ${generated}/cairn_${arg_NAME}.pc @ONLY CONTENT
-"prefix=\${pcfiledir}/@prefix_from_pc@
+"prefix=\${pcfiledir}/@CAIRN_PREFIX_FROM_PC@
 libdir=\${prefix}/@CMAKE_INSTALL_LIBDIR@
 
 Name: cairn_@arg_NAME@

@@ -19,6 +19,7 @@
 
 # cairn_add_subjects(folder…): adds those whose needs are there, in the order of these; of each other one there is a line.
 function(cairn_add_subjects)
+  set(left "")
   foreach(folder IN LISTS ARGN)
     if(NOT EXISTS ${CMAKE_CURRENT_SOURCE_DIR}/${folder}/subject.cmake)
       continue()
