@@ -119,7 +119,7 @@ int run(const BenchOptions& options, Session& session) {
   session.use_threads();
   const BenchResult bench = run_bench(options, session);
   const boost::json::object report = bench_json(options, bench);
-  Results results(session);
+  Results results;
   results.write(options.csv, [&] { write_file(options.csv, bench_csv(bench.graphs)); });
   results.write(options.latex, [&] { write_latex(options, bench); });
   results.write(options.html, [&] { write_page(options, bench.graphs, report, session); });

@@ -94,7 +94,7 @@ int run(const ConvertOptions& options, Session& session) {
   const std::string format = output_format(options.output_file, options.output_format);
   const bool poses_alone = note_poses_alone(loaded.graph, options.output_file, format, session);
   note_axes(options, loaded, session);
-  Results results(session);
+  Results results;
   results.write(options.output_file, [&] {
     write_graph(loaded.graph, options.output_file, session.registry(), format,
                 loaded.report.stamps);

@@ -499,7 +499,7 @@ int run(const EvaluateOptions& options, Session& session) {
   suggest_axes(pairs, options, error, session);
   suggest_order(pairs, options, estimate_graph, truth_graph, error, session);
   warn_of_dimensions(estimate_graph, truth_graph, estimate, truth, session);
-  Results results(session);
+  Results results;
   GraphDivergence divergence;
   if (solver) {
     results.add([&] {

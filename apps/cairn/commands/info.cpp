@@ -237,7 +237,7 @@ int run(const InfoOptions& options, Session& session) {
     solver = make_determinant_solver(options.linear_solver, session.registry(), false);
   const LoadedGraph loaded = load_graph(options.graph, options.input, session);
   const GraphSurvey s = survey_graph(loaded.graph);
-  Results results(session);
+  Results results;
   std::optional<Entropy> entropy;
   if (solver) {
     entropy.emplace();

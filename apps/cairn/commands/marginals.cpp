@@ -562,7 +562,7 @@ int run(MarginalsOptions options, Session& session) {
   const Answer answer =
       call_plugin([&] { return fmt::format("linear solver '{}'", options.linear_solver); },
                   [&] { return compute(loaded.graph, request, solver, session); });
-  Results results(session);
+  Results results;
   results.write(options.output, [&] {
     const std::string text = file_text(loaded, request, answer);
     if (options.output == "-") return write_stdout(text);

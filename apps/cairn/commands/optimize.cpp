@@ -203,7 +203,7 @@ int run(const OptimizeOptions& options, Session& session) {
   Summary summary = call_plugin(
       [&] { return in_words(spec); },
       [&] { return solve(loaded.graph, *optimizer, setup, options, guard, session, recording); });
-  Results results(session);
+  Results results;
   results.write(options.output, [&] {
     const std::string format = output_format(options.output, options.output_format);
     note_poses_alone(loaded.graph, options.output, format, session);

@@ -357,7 +357,7 @@ int run_compact(const CompactOptions& options, Session& session) {
       .progress = [&](std::string_view title, std::size_t count, const PolicyResult& counts) {
         progress.show(title, count, counts);
       }};
-  Results results(session);
+  Results results;
   const Job job = prepare(options, recording, session);
   std::optional<UncertaintyComparison> comparison;
   if (!options.compare.empty())

@@ -430,7 +430,7 @@ int run_explore(const ExploreOptions& options, Session& session) {
   outcome.frame = floor ? floor->grid.frame : outcome.result.map.frame;
   progress.clear();
   for (const std::string& note : outcome.result.notes) session.note(note);
-  Results results(session);
+  Results results;
   recording.write(outcome.result, results, session);
   write_outputs(options, outcome, results, session);
   results.finish();

@@ -69,7 +69,7 @@ void print_notes(const ExploreComparison& comparison, const Session& session) {
 
 void write_outputs(const ComparisonOptions& options, const std::string& page,
                    const ExploreComparison& comparison, Session& session) {
-  Results results(session);
+  Results results;
   results.write(options.csv, [&] { write_file(options.csv, comparison_csv(comparison)); });
   results.write(options.latex, [&] { write_file(options.latex, comparison_latex(comparison)); });
   results.write(options.curves,

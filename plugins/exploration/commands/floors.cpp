@@ -225,7 +225,7 @@ int info_of_floor(const std::string& name, const BodyOptions& options, Session& 
   const auto surveyor = session.registry().make<FloorSurveyor>(kSurveyor);
   const OccupancyGrid grid = load_floor(name, session);
   const FloorSurvey survey = survey_floor(name, grid, survey_options, *surveyor);
-  Results results(session);
+  Results results;
   results.add([&] { session.write_json(report_json(name, grid.frame, survey, options)); });
   results.add(
       [&] { session.print(survey_text(name, grid.frame, survey, options, session.colour())); });
@@ -244,7 +244,7 @@ int generate_floor(const std::string& kind, std::uint64_t seed, const std::strin
   }
   for (const auto& file : grid_files_written(output, registry)) check_file(file.string(), session);
   const OccupancyGrid grid = generate(parse_component(kind), seed, registry);
-  Results results(session);
+  Results results;
   results.write(output, [&] { write_grid(grid, output, registry); });
   results.add([&] {
     json::object report = begin_report("generate");

@@ -236,7 +236,7 @@ int run_map(const MapOptions& options, Session& session) {
   const MapOutcome outcome = map_of_log(options, guard, session);
   for (const std::string& note : outcome.counts.notes) session.note(note);
   Registry& registry = session.registry();
-  Results results(session);
+  Results results;
   const auto write = [&](const Graph& graph, const std::string& file) {
     results.write(file, [&] { write_graph(graph, file, registry, output_format(file, "")); });
   };

@@ -251,7 +251,7 @@ int run_study(const ObjectiveStudyOptions& options, Session& session) {
   std::ranges::stable_sort(rows, std::ranges::greater{},
                            [](const Agreement& row) { return row.per_metre.mean; });
 
-  Results results(session);
+  Results results;
   results.write(options.paths, [&] { write_file(options.paths, paths_csv(sets)); });
   json::array rows_json;
   Table table({{"objective", Table::Align::left},

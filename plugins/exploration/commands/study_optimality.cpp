@@ -203,7 +203,7 @@ int run_study(const OptimalityStudyOptions& options, Session& session) {
                    {"high", number_json(tau.high())}};
   report["status"] = study.interrupted() ? "interrupted" : "finished";
   end_report(report);
-  Results results(session);
+  Results results;
   results.add([&] { session.write_json(report); });
   results.add([&] {
     session.print(table.text(session.colour()));

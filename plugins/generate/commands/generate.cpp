@@ -70,7 +70,7 @@ int run(const GenerateOptions& options, Session& session) {
   check_output(options.ground_truth, options.output_format, session);
   const Simulation simulation = simulate(options.kind, options.seed, session);
   Registry& registry = session.registry();
-  Results results(session);
+  Results results;
   results.write(options.output, [&] {
     write_graph(simulation.graph, options.output, registry,
                 output_format(options.output, options.output_format));

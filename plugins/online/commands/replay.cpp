@@ -229,7 +229,7 @@ int run(const ReplayOptions& options, Session& session) {
     if (error.code() != ErrorCode::plugin) throw;
     failure = std::current_exception();
   }
-  Results results(session);
+  Results results;
   if (failure) results.add([&] { std::rethrow_exception(failure); });
   results.write(options.output, [&] {
     const Graph graph = estimator->graph();

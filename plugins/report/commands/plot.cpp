@@ -176,7 +176,7 @@ int run(const PlotOptions& options, Session& session) {
   const Album album =
       load_album(files, fmt::format("cairn plot {}", joined(options.album.files, " ")), session);
   const std::string bytes = draw_picture(album, picture, session);
-  Results results(session);
+  Results results;
   results.write(output, [&] { write_file(output, bytes); });
   results.add([&] {
     boost::json::object report = begin_report("plot");

@@ -85,7 +85,7 @@ int run(const ViewOptions& options, Session& session) {
   const Album album = load_album(
       options.album, fmt::format("cairn view {}", joined(options.album.files, " ")), session);
   const std::string bytes = draw_picture(album, {"html", {}}, session);
-  Results results(session);
+  Results results;
   results.write(page, [&] { write_file(page, bytes); });
   results.add([&] { session.write_json(report_json(album, page, bytes.size())); });
   results.finish();

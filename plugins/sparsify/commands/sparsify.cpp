@@ -259,7 +259,7 @@ int run_sparsify(SparsifyCommandOptions options, Session& session) {
   }
   for (const std::string& note : result.notes) session.note(note);
   note_refused(result.change, session);
-  Results results(session);
+  Results results;
   results.write(options.output, [&] {
     write_graph(result.sparse, options.output, registry,
                 output_format(options.output, options.output_format));

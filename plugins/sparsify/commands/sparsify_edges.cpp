@@ -159,7 +159,7 @@ int run_sparsify_edges(const SparsifyCommandOptions& options, Session& session) 
           }};
   const SparsifyEdgesResult result = sparsify_edges(loaded.graph, job, setting);
   for (const std::string& note : result.whole.notes) session.note(note);
-  Results results(session);
+  Results results;
   results.write(options.output, [&] {
     write_graph(result.whole.sparse, options.output, registry,
                 output_format(options.output, options.output_format));

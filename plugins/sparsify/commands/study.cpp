@@ -160,7 +160,7 @@ int solve_problems(const ProblemsOptions& options, Session& session) {
       session.registry(), options.curves.empty() ? nullptr : &curves);
   line.clear();
   show_notes(rows, session);
-  Results results(session);
+  Results results;
   results.write(options.curves, [&] { write_file(options.curves, csv_text(curves.table())); });
   json::object report = begin_report("study");
   report["file"] = options.problems;

@@ -7,21 +7,17 @@
 #include <string>
 #include <vector>
 
-#include "cairn/program/session.hpp"
-
 namespace cairn::app {
 
 /// Writes the results of a command, one after the other. One that fails (a full disk) costs none of
 /// the others: the first error is thrown at the end.
 ///
-///     Results results(session);
+///     Results results;
 ///     results.write(options.output, [&] { write_graph(graph, options.output, registry); });
 ///     results.add([&] { session.print(…); });
 ///     results.finish();
 class Results {
  public:
-  explicit Results(const Session& session) : session_(session) {}
-
   /// Runs `write`, which writes `file`; does nothing if that is empty.
   void write(const std::string& file, const std::function<void()>& write);
   /// Runs what writes to other places, such as the report or standard output. False if it failed.
@@ -32,7 +28,6 @@ class Results {
   void finish() const;
 
  private:
-  const Session& session_;
   std::exception_ptr first_;
   std::vector<std::string> written_;
 };
