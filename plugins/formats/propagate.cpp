@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "cairn/geometry/pose.hpp"
+#include "cairn/graph/factors_by_variable.hpp"
 #include "cairn/update/placement.hpp"
 
 namespace cairn::formats {
@@ -16,9 +17,8 @@ namespace {
 
 class Propagator {
  public:
-  explicit Propagator(Graph& graph) : graph_(graph), known_(graph.variable_count(), false) {
-    index_factors();
-  }
+  explicit Propagator(Graph& graph)
+      : graph_(graph), known_(graph.variable_count(), false), factors_(graph) {}
 
   Propagation run() {
     start_from([this](int v) { return has_prior(v) && determine(v); });
@@ -29,26 +29,9 @@ class Propagator {
   }
 
  private:
-  /// Factors by variable, in the order of the file.
-  void index_factors() {
-    begin_.assign(static_cast<std::size_t>(graph_.variable_count()) + 1, 0);
-    for (int f = 0; f < graph_.factor_count(); ++f) {
-      for (const int v : graph_.factor_variables(f)) ++begin_[v + 1];
-    }
-    for (std::size_t v = 1; v < begin_.size(); ++v) begin_[v] += begin_[v - 1];
-    factors_.resize(begin_.back());
-    std::vector<std::size_t> next(begin_.begin(), begin_.end() - 1);
-    for (int f = 0; f < graph_.factor_count(); ++f) {
-      for (const int v : graph_.factor_variables(f)) factors_[next[v]++] = f;
-    }
-  }
-
   const FactorType& type_of(int f) const { return graph_.factor_type(f); }
-  std::span<const int> factors_of(int v) const {
-    return {factors_.data() + begin_[v], begin_[v + 1] - begin_[v]};
-  }
   bool has_prior(int v) const {
-    return std::ranges::any_of(factors_of(v), [this](int f) { return type_of(f).arity() == 1; });
+    return std::ranges::any_of(factors_[v], [this](int f) { return type_of(f).arity() == 1; });
   }
 
   /// Tries `start` on every variable that is not known yet, in order, and spreads from where it
@@ -63,7 +46,7 @@ class Propagator {
   }
   bool start_at_identity(int v) {
     std::vector<double> state = identity(v);
-    for (const int f : factors_of(v)) {
+    for (const int f : factors_[v]) {
       const double* const own = state.data();
       if (type_of(f).arity() == 1) {
         place_in_part(type_of(f), graph_.type(v), graph_.sqrt_information(f), 0, {&own, 1},
@@ -107,7 +90,7 @@ class Propagator {
   }
   void accept(int v) {
     known_[v] = true;
-    for (const int f : factors_of(v)) {
+    for (const int f : factors_[v]) {
       for (const int other : graph_.factor_variables(f)) {
         if (!known_[other]) frontier_.push(other);
       }
@@ -131,7 +114,7 @@ class Propagator {
   /// The factors on v whose other variables are known, the best first.
   void find_candidates(int v) {
     candidates_.clear();
-    for (const int f : factors_of(v)) {
+    for (const int f : factors_[v]) {
       if (others_known(f, v)) candidates_.push_back(rank(f, v));
     }
     std::sort(candidates_.begin(), candidates_.end());
@@ -161,23 +144,16 @@ class Propagator {
     const std::span<const double> root = graph_.sqrt_information(f);
     const double* const z = graph_.measurement(f).data();
     std::vector<double> state = identity(v);
-    if (wholly) {
-      if (!place_wholly(type, root, target, states.data(), z, state.data())) return false;
-    } else {
-      if (!type.propagate(target, states.data(), z, state.data())) return false;
-      state = identity(v);
-      if (const double* const beside = neighbour(type, target, states))
-        state.assign(beside, beside + state.size());
-      if (!place_in_part(type, graph_.type(v), root, target, states, z, state)) return false;
-    }
+    const bool placed = wholly ? place_wholly(type, root, target, states.data(), z, state.data())
+                               : place_beside(type, graph_.type(v), root, target, states, z, state);
+    if (!placed) return false;
     graph_.set_state(v, state);
     return true;
   }
 
   Graph& graph_;
   std::vector<bool> known_;
-  std::vector<std::size_t> begin_;
-  std::vector<int> factors_;
+  FactorsByVariable factors_;  // in the order of the file
   std::priority_queue<int, std::vector<int>, std::greater<>> frontier_, in_part_;
   std::vector<Rank> candidates_;
   Propagation result_;

@@ -113,7 +113,7 @@ class Incremental final : public InitialGuess, public WatchedGuess {
     }
 
     Graph& whole;
-    FactorsOfVariables factors;
+    FactorsByVariable factors;
     Gauge gauge;
     std::vector<int> index;  // in `grown`, -1 while not met
     std::vector<bool> used;  // factors in `grown`
@@ -140,16 +140,10 @@ class Incremental final : public InitialGuess, public WatchedGuess {
       const FactorType& type = whole.factor_type(factor);
       const std::span<const double> root = whole.sqrt_information(factor);
       const double* const z = whole.measurement(factor).data();
+      if (extent == Extent::part)
+        return x.size() > 1 && place_beside(type, whole.type(variable), root, target, x, z, state);
       std::vector<double> placed(state.size());
-      if (extent == Extent::whole) {
-        if (!place_wholly(type, root, target, x.data(), z, placed.data())) return false;
-      } else {
-        if (x.size() < 2 || !type.propagate(target, x.data(), z, placed.data())) return false;
-        placed = state;
-        if (const double* const beside = neighbour(type, target, x))
-          placed.assign(beside, beside + placed.size());
-        if (!place_in_part(type, whole.type(variable), root, target, x, z, placed)) return false;
-      }
+      if (!place_wholly(type, root, target, x.data(), z, placed.data())) return false;
       state = std::move(placed);
       return true;
     }

@@ -9,20 +9,6 @@
 
 namespace cairn::initial {
 
-FactorsOfVariables::FactorsOfVariables(const Graph& graph)
-    : begin_(static_cast<std::size_t>(graph.variable_count()) + 1, 0) {
-  const int n = graph.factor_count();
-  for (int f = 0; f < n; ++f) {
-    for (int v : graph.factor_variables(f)) ++begin_[v + 1];
-  }
-  for (std::size_t v = 1; v < begin_.size(); ++v) begin_[v] += begin_[v - 1];
-  factors_.resize(static_cast<std::size_t>(begin_.back()));
-  std::vector<std::int64_t> next(begin_.begin(), begin_.end() - 1);
-  for (int f = 0; f < n; ++f) {
-    for (int v : graph.factor_variables(f)) factors_[next[v]++] = f;
-  }
-}
-
 Placing::Placing(Graph& graph)
     : graph_(graph),
       factors_(graph),
@@ -62,12 +48,8 @@ bool Placing::place_in_part(int variable, int factor) {
   const FactorType& type = graph_.factor_type(factor);
   const double* const z = graph_.measurement(factor).data();
   std::vector<double> state(graph_.state(variable).begin(), graph_.state(variable).end());
-  std::vector<double> unused(state.size());
-  if (!type.propagate(target, ends_.data(), z, unused.data())) return false;
-  if (const double* const beside = neighbour(type, target, ends_))
-    state.assign(beside, beside + state.size());
-  if (!cairn::place_in_part(type, graph_.type(variable), graph_.sqrt_information(factor), target,
-                            ends_, z, state))
+  if (!place_beside(type, graph_.type(variable), graph_.sqrt_information(factor), target, ends_, z,
+                    state))
     return false;
   graph_.set_state(variable, state);
   placed_[variable] = true;

@@ -6,31 +6,18 @@
 #include <string>
 #include <vector>
 
+#include "cairn/graph/factors_by_variable.hpp"
 #include "cairn/graph/gauge.hpp"
 #include "cairn/graph/graph.hpp"
 
 namespace cairn::initial {
-
-/// The factors on each variable, in the order in which they were added.
-class FactorsOfVariables {
- public:
-  explicit FactorsOfVariables(const Graph& graph);
-  std::span<const int> operator[](int variable) const {
-    return {factors_.data() + begin_[variable],
-            static_cast<std::size_t>(begin_[variable + 1] - begin_[variable])};
-  }
-
- private:
-  std::vector<std::int64_t> begin_;
-  std::vector<int> factors_;
-};
 
 /// Places variables one after another: each from a factor whose other variables are placed.
 class Placing {
  public:
   explicit Placing(Graph& graph);
 
-  const FactorsOfVariables& factors() const { return factors_; }
+  const FactorsByVariable& factors() const { return factors_; }
   bool placed(int variable) const { return placed_[variable]; }
   /// Counts the state that a variable has as its place.
   void set_placed(int variable) { placed_[variable] = true; }
@@ -70,7 +57,7 @@ class Placing {
   std::vector<int> all_placed() const;
 
   Graph& graph_;
-  FactorsOfVariables factors_;
+  FactorsByVariable factors_;
   std::vector<bool> placed_;
   // Kept from call to call, since there is one for each factor:
   std::vector<const double*> ends_;

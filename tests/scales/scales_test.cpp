@@ -13,6 +13,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "cairn/graph/factors_by_variable.hpp"
 #include "cairn/graph/update.hpp"
 #include "cairn/linear/graph_marginals.hpp"
 #include "cairn/solve/estimator.hpp"
@@ -166,11 +167,11 @@ INSTANTIATE_TEST_SUITE_P(Scales, EveryGuess,
 
 /// The graph, variable by variable, at the estimator's own guess.
 void feed(const Graph& graph, Estimator& estimator) {
-  const std::vector<std::vector<int>> factors = factors_by_variable(graph);
+  const FactorsByVariable factors(graph);
   for (int v = 0; v < graph.variable_count(); ++v) {
     GraphUpdate update;
     update.variables.push_back(graph.variable(v));
-    for (const int f : factors[static_cast<std::size_t>(v)]) {
+    for (const int f : factors[v]) {
       const auto on = graph.factor_variables(f);
       if (std::ranges::max(on) == v) update.factors.push_back(graph.factor(f));
     }

@@ -14,6 +14,7 @@
 #include <Eigen/Core>
 
 #include "cairn/geometry/pose.hpp"
+#include "cairn/graph/factors_by_variable.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "dense/eigenvalues.hpp"
@@ -103,7 +104,7 @@ class Trees {
   }
 
   void grow() {
-    factors_ = factors_by_variable(graph_);
+    factors_ = FactorsByVariable(graph_);
     std::size_t next = 0;
     const auto spread = [&] {
       for (; next < order_.size(); ++next) reach_from(order_[next]);
@@ -232,7 +233,7 @@ class Trees {
   std::vector<Node> nodes_;  ///< by variable
   std::vector<int> order_;   ///< of being reached
   std::size_t known_ = 0;    ///< how many of them are roots whose place is known
-  std::vector<std::vector<int>> factors_;
+  FactorsByVariable factors_;
 };
 
 double by_freedom(const Way& way) {

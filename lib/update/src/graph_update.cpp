@@ -151,20 +151,16 @@ class Placer {
   bool place_in_part_by(const Factor& factor) {
     Measured one = look_at(factor);
     if (!one.variable) return false;
-    std::vector<double> placed = identity(*one.variable), unused(placed.size());
-    one.x[one.target] = placed.data();
-    std::vector<double> from = placed;
-    if (const double* const beside = neighbour(*factor.type, one.target, one.x))
-      from.assign(beside, beside + from.size());
+    const std::vector<double> own = identity(*one.variable);
+    one.x[one.target] = own.data();
+    std::vector<double> placed = own;
     return call_factor(
                *factor.type, [&] { return describe(factor); },
                [&] {
-                 return factor.type->propagate(one.target, one.x.data(), one.z.data(),
-                                               unused.data()) &&
-                        place_in_part(*factor.type, *one.variable->type, one.root, one.target,
-                                      one.x, one.z.data(), from);
+                 return place_beside(*factor.type, *one.variable->type, one.root, one.target, one.x,
+                                     one.z.data(), placed);
                }) &&
-           take(*one.variable, std::move(from));
+           take(*one.variable, std::move(placed));
   }
 
   static std::vector<double> identity(const Variable& variable) {

@@ -2,6 +2,7 @@
 #include "cairn/update/placement.hpp"
 
 #include <cstddef>
+#include <utility>
 
 #include <Eigen/QR>
 
@@ -12,6 +13,16 @@ namespace {
 /// rotation; more where the components that are measured depend on those that are not.
 constexpr int kSteps = 20;
 constexpr double kSmall = 1e-12;  // of a step, beside its numbers
+
+/// The state of another variable of the factor of the same type; null if there is none.
+const double* neighbour(const FactorType& type, int target, std::span<const double* const> x) {
+  const std::span<const std::string_view> tags = type.variable_tags();
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    if (static_cast<int>(k) != target && tags[k] == tags[static_cast<std::size_t>(target)])
+      return x[k];
+  }
+  return nullptr;
+}
 
 }  // namespace
 
@@ -55,13 +66,17 @@ bool place_in_part(const FactorType& type, const VariableType& variable,
   return true;
 }
 
-const double* neighbour(const FactorType& type, int target, std::span<const double* const> x) {
-  const std::span<const std::string_view> tags = type.variable_tags();
-  for (std::size_t k = 0; k < x.size(); ++k) {
-    if (static_cast<int>(k) != target && tags[k] == tags[static_cast<std::size_t>(target)])
-      return x[k];
-  }
-  return nullptr;
+bool place_beside(const FactorType& type, const VariableType& variable,
+                  std::span<const double> sqrt_information, int target,
+                  std::span<const double* const> x, const double* z, std::vector<double>& state) {
+  std::vector<double> from = state;
+  if (!type.propagate(target, x.data(), z, from.data())) return false;
+  from = state;
+  if (const double* const beside = neighbour(type, target, x))
+    from.assign(beside, beside + state.size());
+  if (!place_in_part(type, variable, sqrt_information, target, x, z, from)) return false;
+  state = std::move(from);
+  return true;
 }
 
 }  // namespace cairn

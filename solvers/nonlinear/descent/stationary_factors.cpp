@@ -11,6 +11,7 @@
 
 #include <Eigen/Core>
 
+#include "cairn/graph/factors_by_variable.hpp"
 #include "cairn/graph/free_directions.hpp"
 #include "cairn/types/factor_call.hpp"
 #include "dense/eigenvalues.hpp"
@@ -249,14 +250,14 @@ double squared_norms(const Graph& graph, Values& values, std::span<const int> fa
 }
 
 /// Whether one of its variables could go where the measurement puts it.
-bool place_one(const Graph& graph, Values& values, const std::vector<std::vector<int>>& factors_of,
+bool place_one(const Graph& graph, Values& values, const FactorsByVariable& factors_of,
                const OneFactor& factor) {
   const auto on = factor.variables();
   for (int k = static_cast<int>(on.size()); k-- > 0;) {
     if (factor.held(on[k])) continue;
     const std::span<double> x = state_in(graph, values, on[k]);
     const State before(x.begin(), x.end());
-    const auto& factors = factors_of[static_cast<std::size_t>(on[k])];
+    const std::span<const int> factors = factors_of[on[k]];
     const double chi2 = squared_norms(graph, values, factors);
     if (factor.place(k) && squared_norms(graph, values, factors) < (1.0 - kShown) * chi2)
       return true;
@@ -291,14 +292,14 @@ std::optional<int> leave_stationary_factors(const Graph& graph, const std::vecto
   const double per_residual =
       chi2 / static_cast<double>(std::max<std::int64_t>(graph.residual_size(), 1));
   std::optional<int> first;
-  std::vector<std::vector<int>> factors_of;
+  FactorsByVariable factors_of;
   std::mt19937 random(attempt + 1);
   for (const int f : large_ones(graph, values, per_residual)) {
     const OneFactor factor(graph, held, values, f);
     if (!factor.is_stationary()) continue;
     if (!first) {
       first = f;
-      factors_of = factors_by_variable(graph);
+      factors_of = FactorsByVariable(graph);
     }
     if (!place_one(graph, values, factors_of, factor)) push_aside(graph, factor, random);
   }

@@ -32,9 +32,12 @@ CAIRN_API bool place_in_part(const FactorType& type, const VariableType& variabl
                              std::span<const double* const> x, const double* z,
                              std::vector<double>& state);
 
-/// From where `place_in_part` is to begin: beside another variable of the factor of the same type,
-/// such as the pose before in the chain; null if there is none.
-CAIRN_API const double* neighbour(const FactorType& type, int target,
-                                  std::span<const double* const> x);
+/// `place_in_part` by a measurement that would determine the variable if it had all its
+/// information: from beside another variable of the factor of the same type, such as the pose
+/// before it in the chain, or from `state` where there is none.
+CAIRN_API bool place_beside(const FactorType& type, const VariableType& variable,
+                            std::span<const double> sqrt_information, int target,
+                            std::span<const double* const> x, const double* z,
+                            std::vector<double>& state);
 
 }  // namespace cairn
