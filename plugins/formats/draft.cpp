@@ -42,6 +42,18 @@ Draft::Draft(std::string file, std::string format, Registry& types, const ReadOp
       options_(options),
       report_(&report) {}
 
+void Draft::start_again(const std::string& file, const ReadOptions& options) {
+  file_ = file;
+  options_ = options;
+  variables_.clear();
+  factors_.clear();
+  held_.clear();
+  ids_.clear();
+  numbers_.clear();
+  skipped_vertices_.clear();
+  tallies_ = {};
+}
+
 std::string Draft::plugin_problems() const {
   std::string text;
   for (const PluginProblem& problem : types_->problems()) text += "; note: " + problem.message;
@@ -113,7 +125,7 @@ void Draft::finish_factor(const Scanner& scanner, const Arrangement& arrangement
   if (is_positive_definite(kind.residual, information)) return;
   if (std::ranges::all_of(information, [](double x) { return x == 0.0; })) {
     factor.has_effect = false;
-    without_effect_.add(fmt::format("{} in line {}", describe(factor), factor.line));
+    tallies_.without_effect.add(fmt::format("{} in line {}", describe(factor), factor.line));
     return;
   }
   if (options_.repair_information && is_repairable(kind) &&
@@ -140,7 +152,7 @@ bool Draft::settle(const Factor& factor, const Scanner& scanner, const Arrangeme
   const int n = factor_kinds_[factor.kind].residual;
   if (are_texts_of_floats(fields)) add_float_rounding(n, information, rounding);
   if (!settle_rounding(n, rounding, information)) return false;
-  settled_.add(fmt::format("{} in line {}", describe(factor), factor.line));
+  tallies_.settled.add(fmt::format("{} in line {}", describe(factor), factor.line));
   return true;
 }
 
@@ -198,7 +210,7 @@ void Draft::take_unit_information(const Scanner& scanner) {
   std::ranges::fill(information, 0.0);
   for (int row = 0; row < kind.residual; ++row)
     information[static_cast<std::size_t>(triangle_index(kind.residual, row, row))] = 1.0;
-  of_unit_information_.add(fmt::format("{} in line {}", describe(factor), factor.line));
+  tallies_.of_unit_information.add(fmt::format("{} in line {}", describe(factor), factor.line));
 }
 
 void Draft::add_skipped(const Scanner& scanner) {
@@ -310,12 +322,13 @@ std::string Draft::describe(const Factor& factor) const {
 bool Draft::leave_out(const std::string& what, std::int64_t line, Id missing) {
   const auto skipped = skipped_vertices_.find(missing);
   if (skipped != skipped_vertices_.end()) {
-    on_skipped_.add(fmt::format("{} in line {}, on {} {} of line {}", what, line,
-                                skipped->second.tag, name_of(missing), skipped->second.line));
+    tallies_.on_skipped.add(fmt::format("{} in line {}, on {} {} of line {}", what, line,
+                                        skipped->second.tag, name_of(missing),
+                                        skipped->second.line));
     return true;
   }
   if (options_.skip_dangling) {
-    dangling_.add(fmt::format("{} in line {}", what, line));
+    tallies_.dangling.add(fmt::format("{} in line {}", what, line));
     return true;
   }
   fail(line,
@@ -424,7 +437,8 @@ bool would_normalize(const Type& type, std::span<const double> numbers) {
 void Draft::check_quaternion(std::span<const double> numbers, std::int64_t line,
                              const std::string& what) {
   const double norm = norm_of(numbers);
-  if (is_off(norm)) norms_.add(fmt::format("{} in line {} with the norm {:.6g}", what, line, norm));
+  if (is_off(norm))
+    tallies_.norms.add(fmt::format("{} in line {} with the norm {:.6g}", what, line, norm));
 }
 
 void Draft::check_quaternions() {
@@ -454,17 +468,17 @@ void Draft::write_notes() {
                                          tally.count == 1 ? one : many, rest,
                                          tally.count == 1 ? "" : "the first is ", tally.first));
   };
-  note(settled_, "factor", "factors",
+  note(tallies_.settled, "factor", "factors",
        " had information that was not positive semidefinite by less than rounding changes its "
        "numbers; it "
        "was set to the nearest semidefinite matrix");
-  note(without_effect_, "factor has zero information and", "factors have zero information and",
-       " no effect (left out)");
-  note(of_unit_information_, "factor", "factors",
+  note(tallies_.without_effect, "factor has zero information and",
+       "factors have zero information and", " no effect (left out)");
+  note(tallies_.of_unit_information, "factor", "factors",
        " without information taken as of unit information");
-  note(on_skipped_, "line", "lines", " left out, on vertices of skipped lines");
-  note(dangling_, "line", "lines", " left out, on vertices that this file does not have");
-  note(norms_, "quaternion is", "quaternions are",
+  note(tallies_.on_skipped, "line", "lines", " left out, on vertices of skipped lines");
+  note(tallies_.dangling, "line", "lines", " left out, on vertices that this file does not have");
+  note(tallies_.norms, "quaternion is", "quaternions are",
        " not of norm 1 and normalised (expected qx qy qz qw)");
 }
 

@@ -53,6 +53,8 @@ class Draft {
 
   Draft(std::string file, std::string format, Registry& types, const ReadOptions& options,
         ReadReport& report);
+  /// For another text: forgets all but the types.
+  void start_again(const std::string& file, const ReadOptions& options);
 
   /// The kind of that tag, asking the registry for its type the first time. Throws `Error`
   /// (plugin).
@@ -156,7 +158,9 @@ class Draft {
     std::int64_t line;
   };
   std::map<Id, SkippedVertex> skipped_vertices_;
-  Tally settled_, without_effect_, of_unit_information_, on_skipped_, dangling_, norms_;
+  struct Tallies {
+    Tally settled, without_effect, of_unit_information, on_skipped, dangling, norms;
+  } tallies_;
 };
 
 }  // namespace cairn::formats

@@ -62,16 +62,11 @@ using Offsets = std::map<Id, Offset>;
 
 class G2oReader {
  public:
-  /// `first_line`: the number of the text's first line; `offsets`: what lines before it gave;
-  /// `other_words`: the commands that stand in a stream beside tags.
   G2oReader(std::string_view text, const std::string& name, Registry& types,
-            const ReadOptions& options, ReadReport& report, std::int64_t first_line = 1,
-            Offsets offsets = {}, std::span<const std::string> other_words = {})
+            const ReadOptions& options, ReadReport& report)
       : types_(types),
         options_(options),
-        other_words_(other_words),
-        offsets_(std::move(offsets)),
-        scanner_(text, name, first_line),
+        scanner_(text, name),
         draft_(name, "g2o", types, options, report) {
     tags_.add("FIX", read_fix);
     tags_.add(std::string(kOffset), [this](Scanner&, Draft&) { read_offset(); });
@@ -87,8 +82,17 @@ class G2oReader {
     return draft_.build();
   }
 
-  /// What the text says, if it is one line of a stream: parameters come before what refers to them.
-  StreamLine read_stream() {
+  /// What the text says, if it is line `number` of a stream: parameters come before what refers to
+  /// them, and are remembered. `other_words`: the commands that stand in a stream beside tags.
+  StreamLine read_stream(std::string_view text, const std::string& name, std::int64_t number,
+                         const ReadOptions& options, std::span<const std::string> other_words) {
+    scanner_ = Scanner(text, name, number);
+    draft_.start_again(name, options);
+    options_ = options;
+    other_words_ = other_words;
+    references_.clear();
+    of_pose_or_point_.clear();
+    unused_parameters_.clear();
     while (scanner_.next_line()) read_line();
     apply_offsets();
     refuse_without_effect();
@@ -111,7 +115,6 @@ class G2oReader {
     for (const Draft::Held& held : draft_.held()) line.held.push_back(held.id);
     return line;
   }
-  const Offsets& offsets() const { return offsets_; }
 
  private:
   /// A factor that refers to a parameter, which may stand further down in the file.
@@ -313,7 +316,7 @@ class G2oReader {
   }
 
   Registry& types_;
-  const ReadOptions& options_;
+  ReadOptions options_;
   std::span<const std::string> other_words_;
   Offsets offsets_;
   Scanner scanner_;
@@ -324,22 +327,26 @@ class G2oReader {
   std::map<std::string, std::int64_t> unused_parameters_;
 };
 
-/// One line at a time, each by a reader of its own; the offsets of sensors go from one to the next.
+/// One reader for all lines: it has looked up the types, and remembers the offsets of sensors.
 class G2oStream final : public StreamFormat {
  public:
   StreamLine read(std::string_view line, const std::string& name, std::int64_t number,
                   Registry& types, const ReadOptions& options) override {
-    ReadReport report;
-    G2oReader reader(line, name, types, options, report, number, offsets_, other_words());
-    StreamLine said = reader.read_stream();
-    said.skipped = !report.skipped.empty();
-    said.notes = std::move(report.notes);
-    if (reader.offsets().size() != offsets_.size()) offsets_ = reader.offsets();
+    report_ = {};
+    if (!reader_ || types_ != &types) {
+      reader_ = std::make_unique<G2oReader>("", name, types, options, report_);
+      types_ = &types;
+    }
+    StreamLine said = reader_->read_stream(line, name, number, options, other_words());
+    said.skipped = !report_.skipped.empty();
+    said.notes = std::move(report_.notes);
     return said;
   }
 
  private:
-  Offsets offsets_;
+  ReadReport report_;
+  std::unique_ptr<G2oReader> reader_;
+  Registry* types_ = nullptr;
 };
 
 }  // namespace
