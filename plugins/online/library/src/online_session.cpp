@@ -17,50 +17,22 @@
 namespace cairn {
 OnlineSession::OnlineSession(Estimator& estimator, StreamFormat& format, Registry& registry,
                              OnlineSettings settings)
-    : estimator_(estimator), format_(format), registry_(registry), settings_(std::move(settings)) {
-  std::vector<std::string> words;
-  for (const auto& [name, command] : commands()) words.emplace_back(name);
-  format_.add_other_words(words);
-}
-
-std::span<const OnlineSession::NamedCommand> OnlineSession::commands() {
-  static constexpr NamedCommand kCommands[] = {
-      {"NEW", &OnlineSession::declare},
-      {"REMOVE", &OnlineSession::remove},
-      {"CHANGE", &OnlineSession::change},
-      {"MARGINALIZE", &OnlineSession::marginalize},
-      {"SPARSIFY", &OnlineSession::sparsify},
-      {"SOLVE", &OnlineSession::solve},
-      {"FULL", &OnlineSession::solve_fully},
-      {"COVARIANCE", &OnlineSession::report_covariance},
-      {"ESTIMATE", &OnlineSession::report_estimate},
-      {"CHI2", &OnlineSession::report_chi2},
-      {"SAVE", &OnlineSession::save},
-      {"HELP", &OnlineSession::help},
-      {"QUIT", &OnlineSession::quit},
-  };
-  return kCommands;
-}
-
-OnlineSession::Command OnlineSession::find_command(std::string_view word) {
-  for (const auto& [name, command] : commands()) {
-    if (name == word) return command;
-  }
-  return nullptr;
-}
-
-void OnlineSession::perform(std::string_view line, const Words& words, Reply& reply) {
-  if (const Command command = find_command(words[0])) {
-    (this->*command)(words, reply);
-  } else {
-    take_data(line, reply);
-  }
-}
+    : CommandSession(
+          format, registry, {settings.output, settings.marginals},
+          {command("NEW", &OnlineSession::declare), command("REMOVE", &OnlineSession::remove),
+           command("CHANGE", &OnlineSession::change),
+           command("MARGINALIZE", &OnlineSession::marginalize),
+           command("SPARSIFY", &OnlineSession::sparsify), command("SOLVE", &OnlineSession::solve),
+           command("FULL", &OnlineSession::solve_fully),
+           command("COVARIANCE", &OnlineSession::report_covariance),
+           command("ESTIMATE", &OnlineSession::report_estimate)}),
+      estimator_(estimator),
+      settings_(std::move(settings)) {}
 
 // Data ------------------------------------------------------------------------------------------
 
 void OnlineSession::take_data(std::string_view text, Reply& reply) {
-  StreamLine said = format_.read(text, kStreamName, line(), registry_, settings_.read);
+  StreamLine said = format().read(text, kStreamName, line(), registry(), settings_.read);
   for (Variable& variable : said.variables) take_variable(std::move(variable));
   bool left_out = false;
   for (Factor& factor : said.factors) {
@@ -192,20 +164,17 @@ PoseRemover::Removal OnlineSession::make_room(const GraphUpdate& coming) {
   }
 }
 
-/// What the estimator has taken is known, and waits no more.
+/// What the estimator has taken waits no more.
 void OnlineSession::follow(const GraphUpdate& update) {
   for (const Variable& variable : update.variables) {
-    known_.push_back(variable.id);
-    types_[variable.id] = variable.type;
+    newest_ = variable.id;
     std::erase_if(waiting_, [&](const Variable& v) { return v.id == variable.id; });
   }
-  const auto forget = [&](Id id) {
-    std::erase(known_, id);
-    types_.erase(id);
-    reported_.erase(id);
-  };
-  for (const Id id : update.marginalized) forget(id);
-  for (const Id id : update.removed_variables) forget(id);
+  for (const Id id : update.marginalized) forget_estimate(id);
+  for (const Id id : update.removed_variables) forget_estimate(id);
+  if (!newest_ || estimator_.has(*newest_)) return;
+  const std::vector<Id> left = estimator_.variables();
+  newest_ = left.empty() ? std::nullopt : std::optional(left.back());
 }
 
 void OnlineSession::write_removal(const PoseRemover::Removal& removal, FactorId first_factor,
@@ -227,20 +196,12 @@ void OnlineSession::write_removal(const PoseRemover::Removal& removal, FactorId 
 
 void OnlineSession::write_results(const UpdateReport& report, Reply& reply) {
   for (const std::string& note : report.notes) reply.text += fmt::format("NOTE {}\n", note);
-  if (settings_.output == "last" && !known_.empty()) write_estimate(known_.back(), reply.text);
-  if (settings_.output == "all" || settings_.output == "changed") {
-    for (const Id id : known_) {
-      const std::span<const double> x = estimator_.state(id);
-      std::vector<double>& reported = reported_[id];
-      if (settings_.output == "changed" && std::ranges::equal(reported, x)) continue;
-      reported.assign(x.begin(), x.end());
-      write_estimate(id, reply.text);
-    }
+  if (newest_) {
+    reply.text += wanted_estimates(
+        *newest_, [this] { return estimator_.variables(); },
+        [this](Id id, const Estimate& take) { take(type_of(id), estimator_.state(id)); });
   }
-  std::span<const Id> asked;
-  if (settings_.marginals == "last" && !known_.empty()) asked = {&known_.back(), 1};
-  if (settings_.marginals == "diagonal") asked = known_;
-  for (const Id id : asked) {
+  for (const Id id : wanted_covariances(newest_, [this] { return estimator_.variables(); })) {
     // A map that is singular has none; the answer's last line says that.
     reply.text += report.ok ? covariance_or_note(estimator_, id, type_of(id))
                             : covariance_line(estimator_, id, type_of(id), id, type_of(id));
@@ -256,22 +217,22 @@ std::string OnlineSession::waiting() const {
                      first);
 }
 
-void OnlineSession::note_waiting(Reply& reply) const {
-  if (waiting_.empty() || silent()) return;
-  reply.text += fmt::format("NOTE {}: not in the estimate", waiting());
+std::string OnlineSession::caveats() const {
+  if (waiting_.empty() || silent()) return {};
+  std::string note = fmt::format("NOTE {}: not in the estimate", waiting());
   if (settings_.automatic) {
-    reply.text += fmt::format(
+    note += fmt::format(
         "; until {} one or is removed (REMOVE VARIABLE), lines of data are not solved but by SOLVE "
         "and FULL",
         waiting_.size() == 1 ? "it has" : "each has");
   }
-  reply.text += '\n';
+  return note + '\n';
 }
 
 // Commands --------------------------------------------------------------------------------------
 
 void OnlineSession::declare(const Words& words, Reply& reply) {
-  take_variable(declared_variable(words, registry_));
+  take_variable(declared_variable(words));
   reply.changes = true;
 }
 
@@ -402,7 +363,7 @@ void OnlineSession::solve(const Words& words, Reply& reply) {
 
 void OnlineSession::solve_fully(const Words& words, Reply& reply) {
   expect_words(words, 1, "FULL");
-  note_waiting(reply);
+  reply.text += caveats();
   solve_now({}, true, reply);
   if (silent()) return;
   const std::string rejected = in_words(rejected_factors(estimator_.graph()));
@@ -411,71 +372,35 @@ void OnlineSession::solve_fully(const Words& words, Reply& reply) {
 
 void OnlineSession::report_covariance(const Words& words, Reply& reply) {
   expect_words(words, 3, "COVARIANCE id id");
-  if (!write_covariance(parse_whole(words[1], "id"), parse_whole(words[2], "id"), reply.text)) {
-    throw Error(ErrorCode::numerical, fmt::format("there is no covariance: {}", kNoCovariance));
-  }
-  acknowledge(reply, owed_);
+  const Id a = parse_whole(words[1], "id"), b = parse_whole(words[2], "id");
+  answer(reply, wanted_covariance(estimator_, a, type_of(a), b, type_of(b)));
 }
 
 void OnlineSession::report_estimate(const Words& words, Reply& reply) {
   expect_words(words, 2, "ESTIMATE id' or 'ESTIMATE ALL");
-  if (words[1] == "ALL") {
-    note_waiting(reply);
-    for (const Id id : known_) write_estimate(id, reply.text);
-  } else {
-    write_estimate(parse_whole(words[1], "id"), reply.text);
-  }
-  acknowledge(reply, owed_);
-}
-
-void OnlineSession::report_chi2(const Words& words, Reply& reply) {
-  expect_words(words, 1, "CHI2");
-  const std::string chi2 = chi2_line(estimator_);
-  note_waiting(reply);
-  reply.text += chi2;
-  acknowledge(reply, owed_);
-}
-
-void OnlineSession::save(const Words& words, Reply& reply) {
-  const std::string file = file_to_save(words);
-  // No journal has this line, unless it was forged: then it must not replace files.
-  if (!silent()) write_graph(estimator_.graph(), file, registry_);
-  acknowledge(reply, owed_);
-}
-
-void OnlineSession::help(const Words& words, Reply& reply) {
-  expect_words(words, 1, "HELP");
-  std::vector<std::string_view> names;
-  for (const auto& [name, command] : commands()) names.push_back(name);
-  reply.text += help_line(names);
-  acknowledge(reply, owed_);
-}
-
-void OnlineSession::quit(const Words& words, Reply& reply) {
-  expect_words(words, 1, "QUIT");
-  reply.quit = true;
-  acknowledge(reply, owed_);
+  if (words[1] != "ALL") return answer(reply, estimate_of(parse_whole(words[1], "id")));
+  std::string all = caveats();
+  for (const Id id : estimator_.variables()) all += estimate_of(id);
+  answer(reply, std::move(all));
 }
 
 // Answers ---------------------------------------------------------------------------------------
 
 const VariableType& OnlineSession::type_of(Id id) const {
-  const auto there = types_.find(id);
-  if (there == types_.end())
+  if (!estimator_.has(id))
     throw bad_line(fmt::format("there is no variable {} in the estimate{}", id,
                                find_waiting(id) ? ": it waits for a measurement" : ""));
-  return *there->second;
+  return *estimator_.type(id);
 }
 
-void OnlineSession::write_estimate(Id id, std::string& text) const {
+std::string OnlineSession::estimate_of(Id id) const {
   const VariableType& type = type_of(id);  // first: its message says more
-  text += estimate_line(type, id, estimator_.state(id));
+  return estimate_line(type, id, estimator_.state(id));
 }
 
-bool OnlineSession::write_covariance(Id a, Id b, std::string& text) {
-  const std::string line = covariance_line(estimator_, a, type_of(a), b, type_of(b));
-  text += line;
-  return !line.empty();
+void OnlineSession::answer(Reply& reply, std::string text) {
+  reply.text += text;
+  acknowledge(reply, owed_);
 }
 
 }  // namespace cairn

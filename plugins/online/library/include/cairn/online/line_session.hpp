@@ -110,23 +110,6 @@ class CAIRN_API LineSession {
   static void expect_words(const Words& words, std::size_t count, std::string_view form);
   /// The file of "SAVE file". Refuses standard output, and files that are protected.
   std::string file_to_save(const Words& words) const;
-  /// What "NEW TAG id" declares.
-  static Variable declared_variable(const Words& words, Registry& registry);
-
-  // Lines of answers.
-  /// What HELP is answered by.
-  static std::string help_line(std::span<const std::string_view> commands);
-  /// "CHI2 value"; throws `Error` (numerical) where that is not finite.
-  static std::string chi2_line(Estimator& estimator);
-  /// "VERTEX_SE2 7 x y theta"
-  static std::string estimate_line(const VariableType& type, Id id, std::span<const double> state);
-  /// "COVARIANCE a b rows columns" and the numbers row by row; empty if there is none.
-  static std::string covariance_line(Estimator& estimator, Id a, const VariableType& type_a, Id b,
-                                     const VariableType& type_b);
-  static constexpr const char* kNoCovariance =
-      "the measurements do not determine everything, or rounding takes its digits";
-  /// The same of one variable; "NOTE there is no covariance of 7: …" if there is none.
-  static std::string covariance_or_note(Estimator& estimator, Id id, const VariableType& type);
 
  private:
   std::int64_t line_ = 0;

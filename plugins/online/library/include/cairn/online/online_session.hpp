@@ -2,17 +2,13 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
-#include <memory>
-#include <span>
+#include <optional>
 #include <string>
 #include <string_view>
-#include <unordered_map>
-#include <utility>
 #include <vector>
 
 #include "cairn/io/stream_format.hpp"
-#include "cairn/online/line_session.hpp"
+#include "cairn/online/command_session.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/api.hpp"
 #include "cairn/solve/estimator.hpp"
@@ -31,7 +27,7 @@ struct OnlineSettings {
 };
 
 /// Everything that arrives is taken into the graph of an estimator.
-class CAIRN_API OnlineSession final : public LineSession {
+class CAIRN_API OnlineSession final : public CommandSession {
  public:
   /// What is referred to must outlive the session.
   OnlineSession(Estimator& estimator, StreamFormat& format, Registry& registry,
@@ -40,19 +36,10 @@ class CAIRN_API OnlineSession final : public LineSession {
   Estimator& estimator() override { return estimator_; }
   std::int64_t variable_count() const override { return estimator_.variable_count(); }
   std::int64_t factor_count() const override { return estimator_.factor_count(); }
-  bool is_variable_type(std::string_view tag) const override {
-    return registry_.has("variable", tag);
-  }
   /// Variables that are not in the graph, for want of a measurement: their number, and the first.
   std::string waiting() const override;
 
  private:
-  using Command = void (OnlineSession::*)(const Words&, Reply&);
-  using NamedCommand = std::pair<std::string_view, Command>;
-  static std::span<const NamedCommand> commands();
-  static Command find_command(std::string_view word);
-  void perform(std::string_view line, const Words& words, Reply& reply) override;
-
   // A command each; the words are those of its line.
   void declare(const Words& words, Reply& reply);
   void remove(const Words& words, Reply& reply);
@@ -64,12 +51,8 @@ class CAIRN_API OnlineSession final : public LineSession {
   void solve_fully(const Words& words, Reply& reply);
   void report_covariance(const Words& words, Reply& reply);
   void report_estimate(const Words& words, Reply& reply);
-  void report_chi2(const Words& words, Reply& reply);
-  void save(const Words& words, Reply& reply);
-  void help(const Words& words, Reply& reply);
-  void quit(const Words& words, Reply& reply);
 
-  void take_data(std::string_view text, Reply& reply);
+  void take_data(std::string_view text, Reply& reply) override;
   void take_variable(Variable variable);
   std::string leave_out(const Factor& factor);
   void take_factor(Factor factor, Reply& reply);
@@ -87,14 +70,12 @@ class CAIRN_API OnlineSession final : public LineSession {
   void follow(const GraphUpdate& update);
   void write_results(const UpdateReport& report, Reply& reply);
   /// If variables wait: that they are not in what is answered.
-  void note_waiting(Reply& reply) const;
-  void write_estimate(Id id, std::string& text) const;
-  bool write_covariance(Id a, Id b, std::string& text);
+  std::string caveats() const override;
+  void answer(Reply& reply, std::string text) override;
+  std::string estimate_of(Id id) const;
   const VariableType& type_of(Id id) const;
 
   Estimator& estimator_;
-  StreamFormat& format_;
-  Registry& registry_;
   OnlineSettings settings_;
   int owed_ = 0;
   std::string noted_;  ///< why fewer poses have left than should have, as it was last reported
@@ -103,9 +84,7 @@ class CAIRN_API OnlineSession final : public LineSession {
   /// does.
   std::vector<Variable> waiting_;
   std::int64_t left_out_ = 0;  ///< factors on variables that never came (`skip_dangling`)
-  std::vector<Id> known_;      ///< those that the estimator has, in the order of arrival
-  std::unordered_map<Id, std::shared_ptr<const VariableType>> types_;
-  std::unordered_map<Id, std::vector<double>> reported_;  ///< estimates, for `changed`
+  std::optional<Id> newest_;   ///< of the variables that the estimator has
 };
 
 }  // namespace cairn
