@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-#include "block/schedule.hpp"
-
 namespace cairn::block {
 namespace {
 
@@ -16,14 +14,20 @@ template <class Real>
 int factor_front(const FrontKernels<Real>& kernels, Real* panel, std::int64_t stride, int columns,
                  int m) {
   const int rows = static_cast<int>(stride);
-  if (!is_large(m)) return kernels.factor_panel(panel, stride, 0, columns, rows);
+  if (!is_large(m)) return kernels.factor_panel(panel, stride, 0, 0, columns, rows);
   int failed = -1;
   for (int first = 0; first < columns; first += kStripColumns) {
+    const int block = block_of(first);
     const int last = std::min(columns, first + kStripColumns);
     const int below = std::min(rows, round_up(last));
-    const int column = kernels.factor_panel(panel, stride, first, last, below);
+    if (first == block && block > 0) {
+      const int block_end = std::min(columns, block + kBlockColumns);
+      for (int row = block; row < rows; row += kTileRows)
+        kernels.subtract(panel, stride, block, block_end, row, std::min(rows, row + kTileRows));
+    }
+    const int column = kernels.factor_panel(panel, stride, block, first, last, below);
     if (failed < 0) failed = column;
-    kernels.factor_rows(panel, stride, first, last, below, rows);
+    kernels.factor_rows(panel, stride, block, first, last, below, rows);
   }
   return failed;
 }

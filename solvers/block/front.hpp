@@ -14,6 +14,16 @@ namespace cairn::block {
 /// Whether a front of m rows is worth tiles and strips.
 inline bool is_large(std::int64_t m) { return m * m > 256 * 256; }
 
+/// Large fronts are worked off in tiles of so many rows. The columns of their panels are factored
+/// in strips of so many, …
+inline constexpr int kTileRows = 96;
+inline constexpr int kStripColumns = 48;
+/// … from which the columns before them are subtracted in blocks of several strips: of a panel that
+/// no cache holds, memory is read once for each block, not for each strip.
+inline constexpr int kBlockColumns = 4 * kStripColumns;
+/// The first column of the block that a column is in.
+inline int block_of(int column) { return column / kBlockColumns * kBlockColumns; }
+
 /// Factors the whole panel of a front of m rows, in strips of columns if it is large. Returns -1,
 /// or the first column whose pivot is not positive.
 template <class Real>

@@ -83,13 +83,19 @@ struct FrontKernels {
 
   /// Cholesky factorisation of columns [first, last) of the panel in place, those before being
   /// done, in rows first … row_end-1: the diagonal block becomes L_JJ, the rows below
-  /// L_RJ = A_RJ L_JJ⁻ᵀ. `first` and `row_end` are multiples of 8. Returns -1, or the first column
-  /// whose pivot is not positive; what follows it is then worthless.
-  int (*factor_panel)(Real* panel, std::int64_t stride, int first, int last, int row_end);
+  /// L_RJ = A_RJ L_JJ⁻ᵀ. What the columns before `from` contribute has been subtracted
+  /// (`subtract`). `from`, `first` and `row_end` are multiples of 8. Returns -1, or the first
+  /// column whose pivot is not positive; what follows it is then worthless.
+  int (*factor_panel)(Real* panel, std::int64_t stride, int from, int first, int last, int row_end);
   /// The rows [row_begin, row_end), multiples of 8, of columns whose diagonal block is done by
   /// `factor_panel`.
-  void (*factor_rows)(Real* panel, std::int64_t stride, int first, int last, int row_begin,
-                      int row_end);
+  void (*factor_rows)(Real* panel, std::int64_t stride, int from, int first, int last,
+                      int row_begin, int row_end);
+  /// A_RJ -= L_RK L_JKᵀ for the columns J = [first, last) and K = [0, first), those of K being
+  /// done, in the rows [row_begin, row_end), multiples of 8 as `first` is; what it leaves above the
+  /// diagonal is not defined.
+  void (*subtract)(Real* panel, std::int64_t stride, int first, int last, int row_begin,
+                   int row_end);
 
   /// U = -L_RJ L_RJᵀ for the vectors of rows [row_begin, row_end) of the front, both multiples
   /// of 8.

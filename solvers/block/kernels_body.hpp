@@ -327,12 +327,12 @@ inline __attribute__((always_inline)) void accumulate(T (&sum)[N][V], int K, con
 }
 
 /// Columns [begin, begin + N) in V vectors of rows from row `begin` down, the diagonal block among
-/// them: subtracts what is to the left, and factors, all in registers. Columns are scaled by their
-/// pivots while factoring (L D Lᵀ) and by the roots of them at the end: a root in each step would
-/// double the wait for the next pivot. Writes 1 / L_jj. Returns -1, or the first column of the N
-/// that has no positive pivot, and what follows it is then worthless.
+/// them: subtracts the columns [from, begin), and factors, all in registers. Columns are scaled by
+/// their pivots while factoring (L D Lᵀ) and by the roots of them at the end: a root in each step
+/// would double the wait for the next pivot. Writes 1 / L_jj. Returns -1, or the first column of
+/// the N that has no positive pivot, and what follows it is then worthless.
 template <int V, int N>
-__attribute__((noinline)) int factor_top(Real* panel, std::int64_t stride, int begin,
+__attribute__((noinline)) int factor_top(Real* panel, std::int64_t stride, int from, int begin,
                                          Real* reciprocal) {
   Real* block = panel + begin * stride + begin;
   Vec x[N][V];
@@ -341,7 +341,8 @@ __attribute__((noinline)) int factor_top(Real* panel, std::int64_t stride, int b
     CAIRN_UNROLL
     for (int v = 0; v < V; ++v) x[n][v] = load(block + n * stride + v * kWidth);
   }
-  accumulate<true, V, N>(x, begin, panel + begin, stride, panel + begin, stride, 1);
+  const Real* left = panel + from * stride + begin;
+  accumulate<true, V, N>(x, begin - from, left, stride, left, stride, 1);
 
   alignas(64) Real top[kWidth];
   Vec pivots = broadcast(1.0);
@@ -429,35 +430,36 @@ inline __attribute__((always_inline)) void solve_from_right(T, int vectors, Real
 }
 
 template <int N>
-void factor_rows(Real* panel, std::int64_t stride, int begin, int row, int row_end,
+void factor_rows(Real* panel, std::int64_t stride, int from, int begin, int row, int row_end,
                  const Real* reciprocal) {
   for_each_tile(row, row_end, [&](auto vector, int vectors, int at) {
-    solve_from_right<N>(vector, vectors, panel + at, stride, panel, stride, 0, begin, reciprocal);
+    solve_from_right<N>(vector, vectors, panel + at, stride, panel, stride, from, begin,
+                        reciprocal);
   });
 }
 
 template <int N>
-int factor_columns(Real* panel, std::int64_t stride, int begin, int row_end) {
+int factor_columns(Real* panel, std::int64_t stride, int from, int begin, int row_end) {
   Real reciprocal[kWidth];
   const int vectors = min((row_end - begin) / kWidth, kTileVectors);
   int failed = -1;
   if constexpr (kTileVectors == 3) {
-    failed = vectors == 3   ? factor_top<3, N>(panel, stride, begin, reciprocal)
-             : vectors == 2 ? factor_top<2, N>(panel, stride, begin, reciprocal)
-                            : factor_top<1, N>(panel, stride, begin, reciprocal);
+    failed = vectors == 3   ? factor_top<3, N>(panel, stride, from, begin, reciprocal)
+             : vectors == 2 ? factor_top<2, N>(panel, stride, from, begin, reciprocal)
+                            : factor_top<1, N>(panel, stride, from, begin, reciprocal);
   } else {
-    failed = factor_top<1, N>(panel, stride, begin, reciprocal);
+    failed = factor_top<1, N>(panel, stride, from, begin, reciprocal);
   }
-  factor_rows<N>(panel, stride, begin, begin + vectors * kWidth, row_end, reciprocal);
+  factor_rows<N>(panel, stride, from, begin, begin + vectors * kWidth, row_end, reciprocal);
   return failed < 0 ? -1 : begin + failed;
 }
 
-int factor_panel(Real* panel, std::int64_t stride, int first, int last, int row_end) {
+int factor_panel(Real* panel, std::int64_t stride, int from, int first, int last, int row_end) {
   int failed = -1;
   for (int begin = first; begin < last; begin += kWidth) {
     int column = -1;
     with_columns(min(kWidth, last - begin), [&](auto N) {
-      column = factor_columns<decltype(N)::value>(panel, stride, begin, row_end);
+      column = factor_columns<decltype(N)::value>(panel, stride, from, begin, row_end);
     });
     if (failed < 0) failed = column;
   }
@@ -472,15 +474,66 @@ inline __attribute__((always_inline)) Vec reciprocals(const Real* diagonal, std:
   return Real{1} / pivots;
 }
 
-void factor_rows(Real* panel, std::int64_t stride, int first, int last, int row_begin,
+void factor_rows(Real* panel, std::int64_t stride, int from, int first, int last, int row_begin,
                  int row_end) {
   for (int begin = first; begin < last; begin += kWidth) {
     const int count = min(kWidth, last - begin);
     alignas(64) Real reciprocal[kWidth];
     store(reciprocal, reciprocals(panel + begin * stride + begin, stride, count));
     with_columns(count, [&](auto N) {
-      factor_rows<decltype(N)::value>(panel, stride, begin, row_begin, row_end, reciprocal);
+      factor_rows<decltype(N)::value>(panel, stride, from, begin, row_begin, row_end, reciprocal);
     });
+  }
+}
+
+// --- subtract ---
+
+/// Columns of K that are subtracted before the next: so many of a tile of rows stay in a cache
+/// while all columns of J take them.
+constexpr int kDepth = 256;
+
+/// C -= A Bᵀ on a tile of V vectors of rows and N columns; all with the same leading dimension.
+template <class T, int V, int N>
+__attribute__((noinline)) void subtract_product(int K, const Real* A, const Real* B, Real* C,
+                                                std::int64_t stride) {
+  T c[N][V];
+  CAIRN_UNROLL
+  for (int n = 0; n < N; ++n) {
+    CAIRN_UNROLL
+    for (int v = 0; v < V; ++v) c[n][v] = load<T>(C + n * stride + v * kLanes<T>);
+  }
+  accumulate<true, V, N>(c, K, A, stride, B, stride, 1);
+  CAIRN_UNROLL
+  for (int n = 0; n < N; ++n) {
+    CAIRN_UNROLL
+    for (int v = 0; v < V; ++v) store(C + n * stride + v * kLanes<T>, c[n][v]);
+  }
+}
+
+template <class T, int N>
+void subtract_product(int vectors, int K, const Real* A, const Real* B, Real* C,
+                      std::int64_t stride) {
+  if constexpr (kTileVectors == 3) {
+    if (vectors == 3) return subtract_product<T, 3, N>(K, A, B, C, stride);
+    if (vectors == 2) return subtract_product<T, 2, N>(K, A, B, C, stride);
+  }
+  subtract_product<T, 1, N>(K, A, B, C, stride);
+}
+
+void subtract(Real* panel, std::int64_t stride, int first, int last, int row_begin, int row_end) {
+  for (int k = 0; k < first; k += kDepth) {
+    const Real* left = panel + k * stride;
+    const int depth = min(kDepth, first - k);
+    for (int column = first; column < last; column += kTileColumns) {
+      with_columns(min(kTileColumns, last - column), [&](auto N) {
+        for_each_tile(row_begin < column ? column : row_begin, row_end,
+                      [&](auto vector, int vectors, int row) {
+                        subtract_product<decltype(vector), decltype(N)::value>(
+                            vectors, depth, left + row, left + column,
+                            panel + column * stride + row, stride);
+                      });
+      });
+    }
   }
 }
 
@@ -713,6 +766,7 @@ void backward(const Real* panel, std::int64_t stride, int columns, int m, Real* 
 constexpr FrontKernels<Real> kFrontKernels{.assemble = &assemble,
                                            .factor_panel = &factor_panel,
                                            .factor_rows = &factor_rows,
+                                           .subtract = &subtract,
                                            .update = &update,
                                            .extend_add = &extend_add,
                                            .forward = &forward,

@@ -105,7 +105,8 @@ class FrontSteps {
     }
   }
   /// Strip by strip. The first tile below a strip holds the pivots of the next, which its thread
-  /// factors right away, while others work on the remaining tiles.
+  /// factors right away, while others work on the remaining tiles. Where a block of strips begins,
+  /// that tile is one from which the columns before are subtracted.
   void factor() {
     std::int32_t pivots = gates_++;
     Step first = step(Step::Kind::pivots);
@@ -115,22 +116,36 @@ class FrontSteps {
     before_ = {pivots, 1};
     for (std::int32_t begin = 0; begin < node_.columns; begin += kStripColumns) {
       const std::int32_t last = std::min(node_.columns, begin + kStripColumns);
-      const std::int32_t below = std::min(node_.stride, (last + 7) / 8 * 8);
-      std::vector<Step> steps;
-      for (std::int32_t row = below; row < node_.stride; row += kTileRows) {
-        Step tile = step(Step::Kind::rows, row, std::min(node_.stride, row + kTileRows));
-        tile.waits[1] = {pivots, 1};
-        tile.first = begin;
-        tile.last = last;
-        steps.push_back(tile);
-      }
-      if (last < node_.columns) {
-        pivots = gates_++;
-        steps.front().pivots_follow = true;
-        steps.front().signals[1] = pivots;
-      }
-      if (!steps.empty()) phase(std::move(steps));
+      std::vector<Step> rows = tiles(Step::Kind::rows, begin, last, (last + 7) / 8 * 8);
+      for (Step& tile : rows) tile.waits[1] = {pivots, 1};
+      const bool ends_block = last % kBlockColumns == 0;
+      if (last < node_.columns && !ends_block) pivots = let_pivots_follow(rows.front(), last);
+      if (!rows.empty()) phase(std::move(rows));
+      if (last == node_.columns || !ends_block) continue;
+      std::vector<Step> subtract =
+          tiles(Step::Kind::subtract, last, std::min(node_.columns, last + kBlockColumns), last);
+      pivots = let_pivots_follow(subtract.front(), last);
+      phase(std::move(subtract));
     }
+  }
+  /// Of columns [first, last), from a row on.
+  std::vector<Step> tiles(Step::Kind kind, std::int32_t first, std::int32_t last,
+                          std::int32_t row) const {
+    std::vector<Step> steps;
+    for (; row < node_.stride; row += kTileRows) {
+      Step tile = step(kind, row, std::min(node_.stride, row + kTileRows));
+      tile.first = first;
+      tile.last = last;
+      steps.push_back(tile);
+    }
+    return steps;
+  }
+  /// The gate of the pivots of the strip that begins at `column`.
+  std::int32_t let_pivots_follow(Step& tile, std::int32_t column) {
+    tile.pivots_follow = true;
+    tile.next = column;
+    tile.signals[1] = gates_++;
+    return tile.signals[1];
   }
   void update() {
     const int begin = node_.columns / 8 * 8;
@@ -184,8 +199,11 @@ double work_of(const Step& step, const Symbolic& symbolic) {
     case Step::Kind::pivots:
     case Step::Kind::rows: {
       const double columns = step.last - step.first;
-      return std::max(rows, columns) * columns * (step.first + step.last);
+      const int block = block_of(step.first);
+      return std::max(rows, columns) * columns * (step.first + step.last - 2 * block);
     }
+    case Step::Kind::subtract:
+      return 2.0 * rows * (step.last - step.first) * step.first;
     case Step::Kind::update:
       return 1.5 * rows * node.columns * static_cast<double>(step.begin + step.end);
   }
@@ -353,7 +371,11 @@ class Simulation {
 
 Schedule::Schedule(const Symbolic& symbolic, int threads) {
   cut(symbolic);
-  lanes = std::max(1, std::min(threads, static_cast<int>(tasks.size())));
+  const bool divided = std::ranges::any_of(levels, [&](const std::vector<std::int32_t>& level) {
+    return std::ranges::any_of(
+        level, [&](std::int32_t s) { return is_large(symbolic.supernodes()[s].m); });
+  });
+  lanes = divided ? threads : std::max(1, std::min(threads, static_cast<int>(tasks.size())));
   placement.place.assign(symbolic.supernodes().size(), 0);
   placement.in_lane.assign(symbolic.supernodes().size(), false);
   if (lanes == 1) {

@@ -169,14 +169,14 @@ void SupernodalCholesky::add_child(Numbers<Real>& numbers, std::int32_t c, std::
                               child.update_stride(), front, stride);
 }
 
-/// The diagonal block of columns [first, last), those before being done.
+/// The diagonal block of the strip that begins with column `first`, those before being done.
 template <class Real>
-void SupernodalCholesky::factor_pivots(Numbers<Real>& numbers, std::int32_t s, int first,
-                                       int last) {
+void SupernodalCholesky::factor_pivots(Numbers<Real>& numbers, std::int32_t s, int first) {
   const Supernode& node = symbolic_.supernodes()[s];
-  const int failed =
-      numbers.kernels->factor_panel(numbers.panels.data() + node.panel, node.stride, first, last,
-                                    std::min(node.stride, (last + 7) / 8 * 8));
+  const int last = std::min(node.columns, first + kStripColumns);
+  const int failed = numbers.kernels->factor_panel(numbers.panels.data() + node.panel, node.stride,
+                                                   block_of(first), first, last,
+                                                   std::min(node.stride, (last + 7) / 8 * 8));
   if (failed_[s] < 0) failed_[s] = failed;
 }
 
@@ -245,12 +245,16 @@ void SupernodalCholesky::run(const Step& step, const BlockMatrix& H, Numbers<Rea
         add_to_panel(numbers, s, c, lane, begin, end > begin ? end : nodes[c].panel_rows);
       break;
     case Step::Kind::pivots:
-      factor_pivots(numbers, s, step.first, step.last);
+      factor_pivots(numbers, s, step.first);
       break;
     case Step::Kind::rows:
-      numbers.kernels->factor_rows(panel, node.stride, step.first, step.last, begin, end);
-      if (step.pivots_follow)
-        factor_pivots(numbers, s, step.last, std::min(node.columns, step.last + kStripColumns));
+      numbers.kernels->factor_rows(panel, node.stride, block_of(step.first), step.first, step.last,
+                                   begin, end);
+      if (step.pivots_follow) factor_pivots(numbers, s, step.next);
+      break;
+    case Step::Kind::subtract:
+      numbers.kernels->subtract(panel, node.stride, step.first, step.last, begin, end);
+      if (step.pivots_follow) factor_pivots(numbers, s, step.next);
       break;
     case Step::Kind::update:
       numbers.kernels->update(panel, node.stride, node.columns, node.m,

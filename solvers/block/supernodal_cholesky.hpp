@@ -101,7 +101,7 @@ class SupernodalCholesky {
   void add_child(Numbers<Real>& numbers, std::int32_t c, std::int64_t lane, int first, int last,
                  Real* front, std::int64_t stride);
   template <class Real>
-  void factor_pivots(Numbers<Real>& numbers, std::int32_t s, int first, int last);
+  void factor_pivots(Numbers<Real>& numbers, std::int32_t s, int first);
   template <class Real>
   void run_steps(const BlockMatrix& H, Numbers<Real>& numbers, std::int64_t lane);
   template <class Real>

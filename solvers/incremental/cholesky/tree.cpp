@@ -354,14 +354,14 @@ bool Tree::factorize_columns(Node& node, const FrontPieces& front) {
     if (row == 0) {
       const int below = std::min(node.stride, round_up(last));
       if (!front.allows(front.of_rows(first, last, below - first))) return false;
-      const int failed = kernels_->factor_panel(panel, stride, first, last, below);
+      const int failed = kernels_->factor_panel(panel, stride, 0, first, last, below);
       if (progress_.failed < 0) progress_.failed = failed;
       row = below;
     }
     while (row < stride) {
       const std::int64_t end = front.end_of_rows(first, last, row);
       if (!front.allows(front.of_rows(first, last, end - row))) return false;
-      kernels_->factor_rows(panel, stride, first, last, static_cast<int>(row),
+      kernels_->factor_rows(panel, stride, 0, first, last, static_cast<int>(row),
                             static_cast<int>(end));
       row = end;
     }

@@ -224,7 +224,7 @@ TEST(Schedule, CutsALargeFrontWithoutGapOrOverlap) {
   const BlockStructure structure = test::solid_grid(11, 6);
   const Symbolic symbolic(structure, order(structure, "amd"));
   const Schedule schedule(symbolic, 2);
-  int fronts = 0;
+  int fronts = 0, blocks = 0;
   for (const std::vector<std::int32_t>& level : schedule.levels) {
     for (const std::int32_t s : level) {
       const Supernode& node = symbolic.supernodes()[s];
@@ -232,13 +232,16 @@ TEST(Schedule, CutsALargeFrontWithoutGapOrOverlap) {
       ++fronts;
       std::vector<std::pair<std::int64_t, std::int64_t>> zeroed, updated;
       std::vector<std::vector<std::pair<std::int64_t, std::int64_t>>> rows(
-          (node.columns + kStripColumns - 1) / kStripColumns);
+          (node.columns + kStripColumns - 1) / kStripColumns),
+          subtracted((node.columns + kBlockColumns - 1) / kBlockColumns);
       for (const Step& step : schedule.steps) {
         if (step.which != s) continue;
         if (step.kind == Step::Kind::zero) zeroed.emplace_back(step.begin, step.end);
         if (step.kind == Step::Kind::update) updated.emplace_back(step.begin, step.end);
         if (step.kind == Step::Kind::rows)
           rows[step.first / kStripColumns].emplace_back(step.begin, step.end);
+        if (step.kind == Step::Kind::subtract)
+          subtracted[step.first / kBlockColumns].emplace_back(step.begin, step.end);
       }
       expect_cover(zeroed, 0, std::int64_t{node.stride} * node.columns);
       if (node.m > node.columns) expect_cover(updated, node.columns / 8 * 8, node.stride);
@@ -248,9 +251,15 @@ TEST(Schedule, CutsALargeFrontWithoutGapOrOverlap) {
         expect_cover(rows[strip], std::min<std::int64_t>(node.stride, (last + 7) / 8 * 8),
                      node.stride);
       }
+      for (std::size_t block = 1; block < subtracted.size(); ++block) {
+        ++blocks;
+        expect_cover(subtracted[block], static_cast<std::int64_t>(block) * kBlockColumns,
+                     node.stride);
+      }
     }
   }
   EXPECT_GT(fronts, 3);
+  EXPECT_GT(blocks, 1);
 }
 
 }  // namespace
