@@ -129,6 +129,7 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
   std::vector<std::string> choose(Graph& graph) {
     rejected_.clear();
     Start best{"as_given", chi2(graph), graph.values(), {}};
+    if (!can_place(graph)) return {};
     if (std::optional<Start> chordal = compute("chordal", candidates_.chordal.get(), graph))
       keep_better(best, std::move(*chordal), graph);
     const std::int64_t dof = degrees_of_freedom(graph, resolve_gauge(graph));
@@ -145,6 +146,27 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
     if (!rejected_.empty()) notes.push_back(best.in_words() + "; not " + rejected_);
     for (std::string& note : best.notes) notes.push_back(std::move(note));
     return notes;
+  }
+
+  /// Whether a factor can say where a variable is. Of cameras that see points alone, as in bundle
+  /// adjustment, none can: they are where they are given, and no start differs from that.
+  static bool can_place(const Graph& graph) {
+    return std::ranges::any_of(graph.factor_pools(), [&](const FactorPool& pool) {
+      const std::size_t looked_at = std::min(pool.size(), kLookedAt);
+      return std::ranges::any_of(pool.sequence.begin(), pool.sequence.begin() + looked_at,
+                                 [&](int factor) { return can_place(graph, factor); });
+    });
+  }
+  static bool can_place(const Graph& graph, int factor) {
+    const FactorType& type = graph.factor_type(factor);
+    std::vector<const double*> x;
+    for (const std::int32_t v : graph.factor_variables(factor)) x.push_back(graph.state(v).data());
+    for (int target = 0; target < type.arity(); ++target) {
+      std::vector<double> state(static_cast<std::size_t>(type.ambient_size(target)));
+      if (type.propagate(target, x.data(), graph.measurement(factor).data(), state.data()))
+        return true;
+    }
+    return false;
   }
 
   /// By a Cauchy loss in the place of each bounded one, whose scale is then tightened.
@@ -224,7 +246,8 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
   // The second look ------------------------------------------------------------------------------
 
   std::string reason_to_look_again(const Graph& graph, const Summary& summary) const {
-    if (!candidates_.optimizer || graph.variable_count() > kMostVariables) return {};
+    if (!candidates_.optimizer || graph.variable_count() > kMostVariables || !can_place(graph))
+      return {};
     const double fall = summary.initial_chi2 / summary.final_chi2;
     if (!(fall < kToNothing)) return {};  // an exact solution: none is lower
     if (has_bounded_losses(graph)) return "since the loss is bounded";
@@ -321,6 +344,7 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
     return wanted_ = wanted_ && (!go_on_ || go_on_(what, part));
   }
 
+  static constexpr std::size_t kLookedAt = 16;  // of the factors of a type
   static constexpr int kFewIterations = 5;
   static constexpr Stop kToAMinimum{.max_iterations = 100, .tolerance = 1e-6};
   static constexpr Stop kOnTheWay{.max_iterations = 30, .tolerance = 1e-4};

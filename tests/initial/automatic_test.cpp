@@ -80,7 +80,7 @@ TEST_F(Automatic, FindsTheMinimumWhereTheGivenStatesEndInAnother) {
   Graph stuck = graph.clone(), chordal = graph.clone();
   guess("chordal", chordal);
   const double from_chordal = optimize(chordal).final_chi2;
-  ASSERT_GT(optimize(stuck).final_chi2, 1.5 * from_chordal);
+  ASSERT_GT(optimize(stuck).final_chi2, 1.2 * from_chordal);
   guess("auto", graph);
   EXPECT_NEAR(optimize(graph).final_chi2, from_chordal, 1e-6 * from_chordal);
   guess("auto", stuck);
@@ -100,7 +100,7 @@ TEST_F(Automatic, KeepsGivenStatesWhereNothingElseApplies) {
   if (!registry.has("types", "bundle")) GTEST_SKIP() << "there are no types bundle";
   Graph graph = std::move(simulate("bundle").graph);
   const Values before = graph.values();
-  guess("auto", graph);
+  EXPECT_THAT(guess("auto", graph), IsEmpty()) << "no start was tried";
   EXPECT_EQ(graph.values().pools, before.pools);
 }
 

@@ -41,6 +41,8 @@ void Damping::raise() {
   growth_ *= 2.0;
 }
 
+void Damping::set(double lambda) { lambda_ = std::clamp(lambda, smallest_, largest_); }
+
 void Endgame::consider(double gain) {
   if (wait_ > 0) {
     --wait_;

@@ -23,6 +23,7 @@ class Damping {
   bool at_limit() const { return lambda_ >= largest_; }
   void ease(double gain_ratio);
   void raise();
+  void set(double lambda);
 
  private:
   double lambda_;

@@ -16,8 +16,8 @@ namespace cairn {
 namespace {
 
 /// Where undamped steps cannot be had, so many damped steps in a row that promise less than the
-/// tolerance count as arrival, and only with damping as light as this: under a heavy one every
-/// promise is small.
+/// tolerance count as arrival, and one that is not even kept; only with damping as light as this,
+/// which the first such promise brings about: under a heavy one every promise is small.
 constexpr int kSmallPromises = 3;
 constexpr double kLightDamping = 1e-8;
 
@@ -51,7 +51,8 @@ class Run {
         endgame_(may_go_undamped_ ? std::sqrt(descent.stop().tolerance) : 0.0),
         convergence_(descent.stop().tolerance),
         damped_by_(descent.step.size()),
-        min_diagonal_(descent.min_diagonal(options.smallest_diagonal)) {}
+        min_diagonal_(descent.min_diagonal(options.smallest_diagonal)),
+        may_step_beyond_(is_hopeful(descent)) {}
 
   void iterate() {
     const bool undamped = endgame_.active();
@@ -94,8 +95,18 @@ class Run {
     const double gained = run_.chi2 - trial_chi2;
     const bool exhausted = convergence_.exhausted(lowered, step_norm, run_.state_extent());
     if (!run_.ended() && arrived) run_.end_converged(!fits && !undamped && may_go_undamped_);
+    if (!run_.ended() && small_promises_ > 0 && !lowered && may_arrive_damped() &&
+        run_.solves(run_.step))
+      run_.end_converged(may_go_undamped_);
     if (!run_.ended() && exhausted && run_.solves(run_.step)) end_without_descent();
 
+    if (!lowered && may_step_beyond(lambda) && std::isfinite(trial_chi2)) {
+      if (step_beyond(lambda)) {
+        run_.record(run_.step_norm(), lambda, true);
+        return;
+      }
+      may_step_beyond_ = false;
+    }
     const double before = run_.chi2;
     if (lowered) take_step(trial_chi2);
     if (undamped && !lowered) endgame_.fail();
@@ -104,6 +115,8 @@ class Run {
       if (!run_.exact()) endgame_.consider(gained / before);
     }
     if (!undamped && !lowered) raise_damping();
+    if (!undamped && !lowered && !run_.is_small(promise)) may_lighten_ = false;
+    if (may_lighten_ && run_.is_small(promise) && may_arrive_damped()) damping_.set(kLightDamping);
     run_.record(step_norm, lambda, lowered);
   }
 
@@ -125,11 +138,36 @@ class Run {
   }
 
   bool damped_arrival(double promise) {
-    const bool small =
-        damping_.lambda() <= kLightDamping && promise <= run_.stop().tolerance * run_.chi2;
+    const bool small = damping_.lambda() <= kLightDamping && run_.is_small(promise);
     small_promises_ = small ? small_promises_ + 1 : 0;
-    const bool undamped_impossible = endgame_.ever_failed() || !may_go_undamped_;
-    return !run_.exact() && undamped_impossible && small_promises_ >= kSmallPromises;
+    return may_arrive_damped() && small_promises_ >= kSmallPromises;
+  }
+  bool may_arrive_damped() const {
+    return !run_.exact() && (endgame_.ever_failed() || !may_go_undamped_);
+  }
+
+  bool may_step_beyond(double lambda) const {
+    return may_step_beyond_ && lambda <= kLightDamping && !run_.ended() && !run_.last_iteration();
+  }
+  /// Where a step that is all but undamped raises chi2, a second one from there often leads below
+  /// where the first began (the watchdog technique: Chamberlain, Powell, Lemaréchal, Pedersen
+  /// 1982). If so, takes both; otherwise all is as it was.
+  bool step_beyond(double lambda) {
+    const double before = run_.chi2;
+    Values begin = run_.estimate;
+    std::swap(run_.estimate, run_.trial);
+    run_.linearize();
+    if (std::isfinite(run_.chi2) && factorize(lambda).ok && !run_.must_stop() &&
+        run_.solve(run_.step)) {
+      equations_.retract(run_.estimate, run_.step, run_.trial);
+      if (const double beyond = equations_.chi2(run_.trial); beyond < before) {
+        take_step(beyond);
+        return true;
+      }
+    }
+    run_.estimate = std::move(begin);
+    run_.linearize();
+    return false;
   }
 
   void take_step(double trial_chi2) {
@@ -198,6 +236,8 @@ class Run {
   std::vector<double> damped_by_;     // λ D
   std::vector<double> min_diagonal_;  // of D
   int small_promises_ = 0;
+  bool may_lighten_ = true;  // until a step after that was in vain
+  bool may_step_beyond_;     // likewise, if undamped steps are likely to be good
   bool first_trial_ = true;  // of the present linearisation; it promised:
   double first_promise_ = 0.0, first_norm_ = 0.0, first_lambda_ = 0.0;
   bool explained_ = false;

@@ -129,6 +129,23 @@ TEST_P(OptimizerTest, EndsWhereResidualsVanish) {
   EXPECT_LT(summary.iterations.size(), 100U);
 }
 
+// Gauss-Newton steps across Rosenbrock's valley, to a chi2 much larger, and from there to the
+// minimum.
+TEST(LevenbergMarquardt, TakesASecondStepWhereTheFirstRaisesChi2) {
+  Registry registry;
+  if (!registry.has("optimizer", "levenberg_marquardt"))
+    GTEST_SKIP() << "there is no optimizer levenberg_marquardt";
+  const auto optimizer = registry.make<Optimizer>("levenberg_marquardt");
+  Graph graph = rosenbrock();
+  const Summary summary = optimizer->optimize(graph, Stop{.max_iterations = 3, .tolerance = 0.0});
+  EXPECT_LT(summary.iterations.front().chi2, 1e-10);
+  EXPECT_TRUE(summary.iterations.front().accepted);
+  // The last iteration that is allowed cannot be two.
+  Graph again = rosenbrock();
+  const Summary one = optimizer->optimize(again, Stop{.max_iterations = 1, .tolerance = 0.0});
+  EXPECT_LE(one.final_chi2, one.initial_chi2);
+}
+
 TEST_P(OptimizerTest, AgreesWhateverTheLinearSolver) {
   if (!takes_linear_solver(registry_, GetParam()))
     GTEST_SKIP() << GetParam() << " takes no linear solver of ours";
