@@ -66,7 +66,8 @@ cairn::Stop stop_of(const cairn_stop& from) {
 cairn::Summary optimize(cairn::Graph& graph, cairn::Registry& registry, std::string_view optimizer,
                         std::string_view initial, const cairn_stop& given_stop) {
   cairn::Stop stop = stop_of(given_stop);
-  const auto solver = registry.make<cairn::Optimizer>(optimizer);  // both before any work
+  const auto solver = registry.make<cairn::Optimizer>(cairn::with_suited_linear_solver(
+      cairn::parse_component(optimizer), graph, registry));  // both before any work
   const auto guess = registry.make<cairn::InitialGuess>(initial);
   Interrupt observer(given_stop);
   stop.interrupt = &observer.flag();

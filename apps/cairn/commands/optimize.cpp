@@ -10,6 +10,7 @@
 
 #include <fmt/core.h>
 
+#include "cairn/evaluation/optimization.hpp"
 #include "cairn/io/losses_not_written.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/program/command.hpp"
@@ -63,7 +64,8 @@ struct OptimizeOptions {
         .component("optimizer", &O::optimizer, {"optimizer"},
                    "the optimizer, with options as NAME:key=value")
         .component("linear_solver", &O::linear_solver, {"linear_solver"},
-                   "solves H x = g in each step [block_cholesky]")
+                   "solves H x = g in each step [block_cholesky; schur where most variables are "
+                   "points that cameras see]")
         .part(&O::problem)
         .part(&O::problem, ProblemOptions::limit_fields())
         .text("record", &O::record, "every iteration's positions, for cairn view")
@@ -190,13 +192,19 @@ int run(const OptimizeOptions& options, Session& session) {
   session.use_threads();
   // Everything that is named is made before the file is read: a wrong name is told at once.
   Registry& registry = session.registry();
-  const ComponentSpec spec = optimizer_spec(options.optimizer, options.linear_solver, registry);
-  const auto optimizer = registry.make<Optimizer>(spec);
+  ComponentSpec spec = optimizer_spec(options.optimizer, options.linear_solver, registry);
+  auto optimizer = registry.make<Optimizer>(spec);
   std::optional<CovarianceSolver> covariance_solver;
   if (options.covariance == "blocks") covariance_solver = covariance_solver_of(spec, registry);
   const ProblemSetup setup(options.problem, registry);
 
   LoadedGraph loaded = load_graph(options.graph, options.input, session);
+  if (options.linear_solver.empty()) {
+    const ComponentSpec suited =
+        with_suited_linear_solver(parse_component(options.optimizer), loaded.graph, registry);
+    spec = optimizer_spec(spec_text(suited), "", registry);
+    optimizer = registry.make<Optimizer>(spec);
+  }
   const InterruptGuard guard;  // until the results are written
   const InitialEstimate initial = initialise(loaded.graph, setup, options, guard, session);
   std::optional<RecordingWriter> recording;
@@ -212,7 +220,7 @@ int run(const OptimizeOptions& options, Session& session) {
       summary.notes.push_back(std::move(lost));
   });
   const Stop& stop = options.problem.stop;
-  note_the_end(summary, stop, loaded.graph);
+  app::note_the_end(summary, stop, loaded.graph);
   DiagonalCovariances covariances;
   if (covariance_solver && exit_code(summary, stop) == 0) {
     covariances =

@@ -97,7 +97,8 @@ Summary optimize(BoundGraph& bound, const std::string& optimizer, const py::obje
                  const py::object& loss, const std::string& loss_on, int max_iterations,
                  double tolerance, double max_seconds, const py::object& callback,
                  const py::kwargs& options) {
-  Plan plan(component_spec(optimizer, options, Optimizer::kKind, "optimize"), initial);
+  const ComponentSpec spec = component_spec(optimizer, options, Optimizer::kKind, "optimize");
+  Plan plan(with_suited_linear_solver(spec, bound.get(), default_registry()), initial);
   plan.stop.max_iterations = max_iterations;
   plan.stop.tolerance = tolerance;
   plan.stop.max_seconds = max_seconds;

@@ -11,10 +11,42 @@
 #include "cairn/evaluation/plausibility.hpp"
 #include "cairn/evaluation/second_look.hpp"
 #include "cairn/evaluation/undetermined.hpp"
+#include "cairn/geometry/pose.hpp"
+#include "cairn/linear/linear_solver.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/timed.hpp"
 
 namespace cairn {
+namespace {
+
+/// Whether at least half of the variables are points of which no factor joins two.
+bool is_mostly_points(const Graph& graph) {
+  const auto pools = graph.variable_pools();
+  const auto of_points = [&](std::int32_t pool) {
+    return is_point(*pools[static_cast<std::size_t>(pool)].type);
+  };
+  std::size_t points = 0;
+  for (std::size_t k = 0; k < pools.size(); ++k) {
+    if (of_points(static_cast<std::int32_t>(k))) points += pools[k].variables.size();
+  }
+  const auto joins_points = [&](const FactorPool& pool) {
+    return pool.size() > 0 && std::ranges::count_if(pool.variable_pools, of_points) > 1;
+  };
+  return points > 0 && 2 * points >= static_cast<std::size_t>(graph.variable_count()) &&
+         std::ranges::none_of(graph.factor_pools(), joins_points);
+}
+
+}  // namespace
+
+ComponentSpec with_suited_linear_solver(ComponentSpec optimizer, const Graph& graph,
+                                        Registry& registry) {
+  constexpr const char *kOption = "linear_solver", *kOfPoints = "schur", *kSpec = "schur:dense=pcg";
+  const OptionSpec* option = registry.options(Optimizer::kKind, optimizer.name).find(kOption);
+  if (option && option->type == OptionType::component && is_mostly_points(graph) &&
+      registry.has(LinearSolver::kKind, kOfPoints))
+    optimizer.values.emplace(kOption, registry.has(LinearSolver::kKind, "pcg") ? kSpec : kOfPoints);
+  return optimizer;
+}
 
 std::vector<std::string> compute_guess(Graph& graph, InitialGuess& guess, std::string_view name,
                                        WatchedGuess::GoOn go_on) {

@@ -134,7 +134,8 @@ Ending PcgSolver::iterate(Preconditioner& preconditioner, const Norms& goal, std
 
 PcgSolver::Outcome PcgSolver::solve_with(Preconditioner& preconditioner, const Norms& whole,
                                          std::span<double> x, std::int64_t& iterations) {
-  const Norms goal{options_.tolerance * whole.plain, options_.tolerance * whole.scaled};
+  const double part = std::max(options_.tolerance, forcing_);
+  const Norms goal{part * whole.plain, part * whole.scaled};
   r_ = g_;
   std::fill(x.begin(), x.end(), 0.0);
   Outcome outcome{whole, Ending::reached};

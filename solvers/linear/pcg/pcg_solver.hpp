@@ -22,28 +22,38 @@
 namespace cairn {
 
 /// What is solved exactly in each iteration.
-enum class Preconditioning { block_jacobi, incomplete_cholesky, subgraph };
+enum class Preconditioning { automatic, block_jacobi, incomplete_cholesky, subgraph };
 
 constexpr auto enum_names(Preconditioning) {
   return std::to_array<EnumName<Preconditioning>>(
-      {{Preconditioning::block_jacobi, "block_jacobi"},
+      {{Preconditioning::automatic, "auto"},
+       {Preconditioning::block_jacobi, "block_jacobi"},
        {Preconditioning::incomplete_cholesky, "incomplete_cholesky"},
        {Preconditioning::subgraph, "subgraph"}});
 }
 
 struct PcgOptions {
-  Preconditioning preconditioner = Preconditioning::incomplete_cholesky;
+  Preconditioning preconditioner = Preconditioning::automatic;
   double tolerance = 1e-10;             ///< on ‖Hx − g‖/‖g‖, and with blocks scaled
+  bool inexact = false;                 ///< solves end where an optimizer's steps allow it
   std::int64_t max_iterations = 20000;  ///< of one solve
   double loops = 0.3;                   ///< of `Subgraph`
 
   static auto fields() {
     using O = PcgOptions;
     return OptionFields<O>()
-        .choice("preconditioner", &O::preconditioner, "what is solved exactly in each iteration")
+        .choice("preconditioner", &O::preconditioner,
+                "what is solved exactly in each iteration; auto: incomplete_cholesky, and of a "
+                "matrix that is nearly dense, as the reduced one of cameras that share points, "
+                "block_jacobi")
         .real("tolerance", &O::tolerance, 1e-15, 0.1,
               "on the relative residual |Hx - g| / |g|, also with each block scaled by that of the "
               "diagonal of H")
+        .boolean(
+            "inexact", &O::inexact,
+            "end the solves for an optimizer's steps at a relative residual of up to 0.05, the "
+            "less g has shrunk since the step before: good for cameras that share many points; "
+            "along a trajectory, whose slow modes hardly show in the residual, it may fail")
         .integer("max_iterations", &O::max_iterations, 1, 1e9,
                  "of one solve; a step that has not converged by then is used, and reported")
         .real("loops", &O::loops, 0.0, 1e3,
@@ -78,6 +88,9 @@ class PcgSolver final : public LinearSolver, public IterativeSolver, public Jaco
   void solve(std::span<const double> g, std::span<double> x) override;
   const LinearSolverStats& stats() const override { return stats_; }
   double tolerance() const override { return options_.tolerance; }
+  void set_forcing(double term) override {
+    if (options_.inexact) forcing_ = term;
+  }
 
   void analyze(const JacobianStructure& structure) override;
   Factorization factorize(const JacobianMatrix& J, std::span<const double> damping) override;
@@ -119,6 +132,7 @@ class PcgSolver final : public LinearSolver, public IterativeSolver, public Jaco
   iterative::Progress progress_;
   LinearSolverStats stats_;
   bool factorized_ = false;
+  double forcing_ = 0.0;
 };
 
 }  // namespace cairn

@@ -38,10 +38,21 @@ void solve_upper(const double* L, double* v, int size) {
   }
 }
 
+/// Where a factorisation takes longer than the iterations that a step needs: of some thousand
+/// unknowns, most of which are joined.
+bool is_dense(const BlockStructure& reduced) {
+  constexpr std::int64_t kLarge = 2500;
+  const std::int64_t blocks = reduced.blocks(), pairs = blocks * (blocks + 1) / 2;
+  return reduced.size() >= kLarge && 2 * reduced.entries() > pairs;
+}
+
 }  // namespace
 
-SchurSolver::SchurSolver(std::unique_ptr<LinearSolver> inner, const SchurOptions& options)
+SchurSolver::SchurSolver(std::unique_ptr<LinearSolver> inner,
+                         std::unique_ptr<LinearSolver> of_dense, const SchurOptions& options)
     : inner_(std::move(inner)),
+      of_dense_(std::move(of_dense)),
+      chosen_(inner_.get()),
       inner_determinant_(query<LogDeterminant>(*inner_)),
       inner_order_(query<EliminationOrder>(*inner_)),
       inner_many_(query<ManyRightHandSides>(*inner_)),
@@ -66,12 +77,13 @@ void SchurSolver::analyze(const BlockStructure& structure) {
   y_.assign(plan_.reduced.size() + schur::kOverread, 0.0);
   vectors_.clear();
   for (const std::int32_t block : plan_.remaining) vectors_.push_back(structure.offsets()[block]);
-  if (!plan_.remaining.empty()) inner_->analyze(plan_.reduced);
+  chosen_ = of_dense_ && is_dense(plan_.reduced) ? of_dense_.get() : inner_.get();
+  if (!plan_.remaining.empty()) chosen_->analyze(plan_.reduced);
   marginals_.analyze(structure.sizes());
   version_ = structure.version();
   stats_ = {};
   stats_.ordering = "schur(" + std::to_string(plan_.eliminated.size()) + " eliminated)";
-  if (!plan_.remaining.empty()) stats_.ordering += "+" + inner_->stats().ordering;
+  if (!plan_.remaining.empty()) stats_.ordering += "+" + chosen_->stats().ordering;
   update_stats();
 }
 
@@ -86,7 +98,7 @@ Factorization SchurSolver::factorize(const BlockMatrix& H) {
   factorized_ = plan_.remaining.empty();
   if (factorized_) return {};
   reduce(H);
-  Factorization factorization = inner_->factorize(S_);
+  Factorization factorization = chosen_->factorize(S_);
   if (factorization.failed_block >= 0)
     factorization.failed_block = plan_.remaining[factorization.failed_block];
   factorized_ = factorization.ok;
@@ -142,7 +154,7 @@ void SchurSolver::solve(std::span<const double> g, std::span<double> x) {
   reduce(side);
   if (!plan_.remaining.empty()) {
     const std::span<double> y = std::span(y_).first(plan_.reduced.size());
-    inner_->solve(y, y);
+    chosen_->solve(y, y);
   }
   substitute_back(side);
   update_stats();
@@ -249,14 +261,15 @@ std::span<const std::int32_t> SchurSolver::elimination_order() const {
 }
 
 void* SchurSolver::ability(std::string_view name) {
+  // Exact where the inner solver is.
+  if (name == IterativeSolver::kAbility) return query<IterativeSolver>(*chosen_);
+  if (of_dense_) return nullptr;
   if (name == LogDeterminant::kAbility && inner_determinant_)
     return static_cast<LogDeterminant*>(this);
   if (name == EliminationOrder::kAbility && inner_order_)
     return static_cast<EliminationOrder*>(this);
   if (name == ManyRightHandSides::kAbility && inner_many_)
     return static_cast<ManyRightHandSides*>(this);
-  // Exact where the inner solver is.
-  if (name == IterativeSolver::kAbility) return query<IterativeSolver>(*inner_);
   if (name == Marginals::kAbility && query<Marginals>(*inner_))
     return static_cast<Marginals*>(&marginals_);
   return nullptr;
@@ -267,7 +280,7 @@ void SchurSolver::update_stats() {
   stats_.factor_nonzeros = plan_.nonzeros;
   stats_.factor_flops = plan_.flops;
   if (plan_.remaining.empty()) return;
-  const LinearSolverStats& inner = inner_->stats();
+  const LinearSolverStats& inner = chosen_->stats();
   stats_.factor_nonzeros = inner.factor_nonzeros > 0 ? inner.factor_nonzeros + plan_.nonzeros : 0;
   stats_.factor_flops += inner.factor_flops;
   stats_.note = inner.note;

@@ -19,7 +19,9 @@ namespace cairn {
 struct SchurOptions {
   std::string linear_solver = "block_cholesky";  ///< of the reduced system
   std::string eliminate = "auto";                ///< see `schur::elimination_set`
-  std::string kernels = "auto";                  ///< auto, portable, avx2 or avx512
+  /// Of a reduced system that is nearly dense and large: pcg instead, or as any other.
+  std::string dense = "direct";
+  std::string kernels = "auto";  ///< auto, portable, avx2 or avx512
 
   static auto fields() {
     using O = SchurOptions;
@@ -28,6 +30,10 @@ struct SchurOptions {
         .choice("eliminate", &O::eliminate, {"auto", "smallest", "independent_set"},
                 "blocks that are eliminated first; auto: the smallest where they are most of all "
                 "and not adjacent, else an independent set")
+        .choice("dense", &O::dense, {"direct", "pcg"},
+                "a reduced system that is nearly dense, and large, as that of hundreds of cameras "
+                "which all share points: by linear_solver, or by pcg, which takes less time to the "
+                "accuracy that a step needs")
         .choice("kernels", &O::kernels, {"auto", "portable", "avx2", "avx512"},
                 "instruction set, as far as the machine has it");
   }
@@ -51,9 +57,11 @@ class SchurSolver final : public LinearSolver,
                           public EliminationOrder,
                           public ManyRightHandSides {
  public:
-  /// `inner` solves the reduced system. Throws `Error` (usage) for kernels that the machine cannot
-  /// run.
-  SchurSolver(std::unique_ptr<LinearSolver> inner, const SchurOptions& options);
+  /// `inner` solves the reduced system; `of_dense` one that is nearly dense and large, null:
+  /// `inner` as well. With it there are steps alone: none of the abilities, since what it gives is
+  /// inexact. Throws `Error` (usage) for kernels that the machine cannot run.
+  SchurSolver(std::unique_ptr<LinearSolver> inner, std::unique_ptr<LinearSolver> of_dense,
+              const SchurOptions& options);
 
   void analyze(const BlockStructure& structure) override;
   Factorization factorize(const BlockMatrix& H) override;
@@ -82,7 +90,8 @@ class SchurSolver final : public LinearSolver,
   void substitute_into(const Side& side, const schur::Eliminated& element);
   void update_stats();
 
-  std::unique_ptr<LinearSolver> inner_;
+  std::unique_ptr<LinearSolver> inner_, of_dense_;
+  LinearSolver* chosen_;  // of the two
   LogDeterminant* inner_determinant_ = nullptr;
   EliminationOrder* inner_order_ = nullptr;
   ManyRightHandSides* inner_many_ = nullptr;

@@ -28,6 +28,8 @@ constexpr double kLargestBackwardError = 1e-6;
 /// solver's own units and in those of the unknowns. Otherwise the decrease that it predicts is
 /// that of as much of the system as the solver has come to, and no sign of a minimum.
 constexpr double kLargestResidual = 0.1;
+/// Of the forcing terms η = min(kLargestForcing, kForcing ‖g‖²/‖g before‖²).
+constexpr double kLargestForcing = 0.05, kForcing = 0.9;
 /// A gradient is a sum of products of Jacobians and residuals, and zero up to this share of both.
 constexpr double kGradientRounding = 1e-13;
 /// What may be left when no step lowers chi2: of chi2, and of the states.
@@ -207,8 +209,33 @@ void Descent::record(double step_norm, double lambda, bool accepted) {
   if (!observer_.on_iteration(iteration, graph_, best_) && !ended()) end(Status::interrupted);
 }
 
-bool Descent::solve(std::span<double> out) {
+/// An iterative solver's steps need be no better than the model: the less g has shrunk since the
+/// step before, the less exact (Eisenstat, Walker 1996, choice 2). Near a minimum they are exact.
+void Descent::choose_forcing() {
+  auto* iterative = query<IterativeSolver>(solver_);
+  if (!iterative || exact()) return;
+  const double gradient = norm(equations_->g());
+  if (gradient != gradient_) {
+    const double ratio = gradient_ > 0.0 ? gradient / gradient_ : 1.0;
+    iterative->set_forcing(std::min(kLargestForcing, kForcing * ratio * ratio));
+    gradient_ = gradient;
+  }
+}
+
+/// What lowers the residual of a reduced system may not lower that of the whole.
+void Descent::solve_inexactly(std::span<double> out) {
+  choose_forcing();
   equations_->solve(out);
+  auto* iterative = query<IterativeSolver>(solver_);
+  if (!iterative || exact()) return;
+  static_cast<void>(equations_->backward_error(out));
+  if (relative_residual() <= kLargestResidual) return;
+  iterative->set_forcing(0.0);
+  equations_->solve(out);
+}
+
+bool Descent::solve(std::span<double> out) {
+  solve_inexactly(out);
   if (!free_space_.empty()) {
     solution_.assign(out.begin(), out.end());
     free_space_.project(out);
@@ -383,6 +410,7 @@ void Descent::end_undetermined() {
 }
 
 Summary Descent::finish() {
+  if (auto* iterative = query<IterativeSolver>(solver_)) iterative->set_forcing(0.0);
   summary_.status = status_.value_or(Status::max_iterations);
   std::string departed = departures_.conclude(graph_, best_chi2_, chi2, summary_.status);
   if (!departed.empty()) note(std::move(departed));

@@ -140,6 +140,8 @@ class Descent {
   /// |x| the largest coordinate of a pose or point, 1 for orientations, else the largest number of
   /// the state.
   double coordinate_rounding() const;
+  void choose_forcing();
+  void solve_inexactly(std::span<double> out);
   bool is_solution(std::span<const double> out);
   void find_free();
   void note_wrong_step(const std::string& residual);
@@ -166,6 +168,7 @@ class Descent {
   int number_ = 0;
   double state_extent_ = 0.0;
   double step_norm_ = 0.0;
+  double gradient_ = 0.0;         // ‖g‖ of the last step
   std::vector<double> solution_;  // the last one as solved, where the step leaves something alone
   int sampled_ = 0;               // the last iteration whose step was checked
   bool reported_wrong_step_ = false;  // a note names the linear solver

@@ -17,6 +17,10 @@ class CAIRN_API IterativeSolver {
   virtual ~IterativeSolver();
   /// A solve ends when ‖Hx − g‖/‖g‖ is at most this, or at a limit of iterations.
   virtual double tolerance() const = 0;
+  /// The forcing term of an inexact Newton method (Dembo, Eisenstat, Steihaug 1982): from now on a
+  /// solve may end at this ‖Hx − g‖/‖g‖ where that is more than the tolerance. 0 at first. Does
+  /// nothing unless a solver overrides it.
+  virtual void set_forcing(double /*term*/) {}
 };
 
 }  // namespace cairn

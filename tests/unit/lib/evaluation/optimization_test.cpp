@@ -13,6 +13,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "cairn/io/generator.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/types/loss.hpp"
 #include "support/sample_graphs.hpp"
@@ -135,6 +137,41 @@ TEST_F(Optimizations, SayThatTheirLimitEndedThem) {
   EXPECT_THAT(notes({.max_iterations = 4}),
               testing::Not(testing::Contains(HasSubstr("stopped by"))))
       << "that was the limit of time";
+}
+
+// Bundle adjustment by default: as fast as the user who knows all names has it.
+TEST(SuitedLinearSolver, EliminatesPointsThatNoFactorJoinsFirst) {
+  Registry registry;
+  for (const auto& [kind, name] : {std::pair("generator", "bundle"),
+                                   {"generator", "ring"},
+                                   {"types", "bundle"},
+                                   {"types", "slam2d"},
+                                   {"linear_solver", "schur"},
+                                   {"linear_solver", "pcg"},
+                                   {"optimizer", "levenberg_marquardt"},
+                                   {"optimizer", "ceres"}}) {
+    if (!registry.has(kind, name)) GTEST_SKIP() << "there is no " << kind << " " << name;
+  }
+  const auto simulate = [&](const char* world) {
+    return std::move(registry.make<Generator>(world)->generate(registry, 7).graph);
+  };
+  const Graph cameras = simulate("bundle:cameras=20,points=400"), poses = simulate("ring:poses=50");
+  const auto suited = [&](const char* optimizer, const Graph& graph) {
+    return to_text(with_suited_linear_solver(parse_component(optimizer), graph, registry));
+  };
+  EXPECT_EQ(suited("levenberg_marquardt", cameras),
+            "levenberg_marquardt:linear_solver=schur:dense=pcg");
+  EXPECT_EQ(suited("levenberg_marquardt:linear_solver=eigen", cameras),
+            "levenberg_marquardt:linear_solver=eigen");
+  EXPECT_EQ(suited("levenberg_marquardt", poses), "levenberg_marquardt");
+  EXPECT_EQ(suited("ceres", cameras), "ceres") << "has solvers of its own";
+  // With the gauge free, steps that gain nothing but rounding end the run.
+  Graph graph = cameras.clone();
+  const auto optimizer = registry.make<Optimizer>(
+      with_suited_linear_solver({"levenberg_marquardt", {}}, graph, registry));
+  const Summary summary = optimizer->optimize(graph, {});
+  EXPECT_EQ(summary.status, Status::converged);
+  EXPECT_LE(summary.iterations.size(), 12U);
 }
 
 TEST_F(Optimizations, WithoutAGuessStartFromTheStates) {

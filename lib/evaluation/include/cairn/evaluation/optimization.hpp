@@ -7,6 +7,7 @@
 
 #include "cairn/evaluation/watched_guess.hpp"
 #include "cairn/graph/graph.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/api.hpp"
 #include "cairn/solve/initial_guess.hpp"
 #include "cairn/solve/optimizer.hpp"
@@ -20,6 +21,13 @@ struct Optimization {
   InitialGuess* guess = nullptr;  ///< null: from the graph's own states
   std::string_view guess_name;
 };
+
+/// An optimizer with the linear solver that suits a graph, where it takes one and the spec names
+/// none: `schur` (if there is that plugin) where at least half of the variables are points of which
+/// no factor joins two, as in bundle adjustment; they are eliminated first then. Otherwise the spec
+/// as it is.
+CAIRN_API ComponentSpec with_suited_linear_solver(ComponentSpec optimizer, const Graph& graph,
+                                                  Registry& registry);
 
 /// Lets a guess replace the graph's states. `go_on` is asked, if the guess can be watched, whether
 /// it may go on. Returns the guess's notes. What it throws names it (`call_plugin`).

@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/Core>
 
+#include "cairn/linear/iterative_solver.hpp"
 #include "cairn/linear/jacobian.hpp"
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/plugin/registry.hpp"
@@ -155,6 +156,32 @@ TEST_F(SchurTest, LeavesTheRestToAnySolver) {
     expect_agreement(*solver, structure);
     EXPECT_THAT(solver->stats().ordering, StartsWith("schur(40 eliminated)+"));
   }
+}
+
+// Steps of an optimizer alone: of a reduced system that is dense and large.
+TEST_F(SchurTest, SolvesALargeDenseReducedSystemAsExactlyAsIsAskedFor) {
+  if (!registry_.has("linear_solver", "pcg")) GTEST_SKIP() << "needs the plugin pcg";
+  const auto solver = schur("linear_solver=eigen,dense=pcg,eliminate=smallest");
+  EXPECT_EQ(query<LogDeterminant>(*solver), nullptr);
+  const BlockStructure small = bipartite(Sizes(8, 9), Sizes(40, 3), 8, Layout::mixed);
+  expect_agreement(*solver, small);
+  EXPECT_EQ(query<IterativeSolver>(*solver), nullptr) << "solved directly";
+  const BlockStructure large = bipartite(Sizes(280, 9), Sizes(4, 3), 280, Layout::mixed);
+  BlockMatrix H(large);
+  fill_positive_definite(H, 1);
+  solver->analyze(large);
+  ASSERT_TRUE(solver->factorize(H).ok);
+  const auto direct = schur("eliminate=smallest");
+  direct->analyze(large);
+  ASSERT_TRUE(direct->factorize(H).ok);
+  const Eigen::VectorXd g = right_hand_side(large.size()), expected = solve(*direct, g);
+  auto* iterative = query<IterativeSolver>(*solver);
+  ASSERT_NE(iterative, nullptr);
+  EXPECT_LE((solve(*solver, g) - expected).norm(), 1e-8 * expected.norm());
+  const std::int64_t exact = solver->stats().iterations;
+  iterative->set_forcing(0.05);
+  EXPECT_LE((solve(*solver, g) - expected).norm(), 0.3 * expected.norm());
+  EXPECT_LT(2 * (solver->stats().iterations - exact), exact);
 }
 
 TEST_F(SchurTest, EliminatesEverythingWhereNothingIsJoined) {
