@@ -24,6 +24,16 @@
 namespace cairn::initial {
 namespace {
 
+/// Where no pose disagrees with a relative measurement by a larger angle, chi2 is so nearly convex
+/// that no other start ends elsewhere, and most take more time. [rad]
+constexpr double kAgreement = 0.5;
+
+bool is_of_relative_poses_alone(const Graph& graph) {
+  return std::ranges::all_of(graph.factor_pools(), [](const FactorPool& pool) {
+    return pool.size() == 0 || pool.type->is_relative();
+  });
+}
+
 /// Ends an optimisation as soon as this is true of an iteration.
 class Until final : public Observer {
  public:
@@ -38,6 +48,9 @@ class Until final : public Observer {
 };
 
 /// The best start of several by its chi2.
+///
+/// States whose angles agree with all relative measurements are a start as they are: nothing else
+/// is tried.
 ///
 /// The chordal relaxation takes two linear solves. If its chi2 is below that of the states as
 /// given, it is the better start. If not, these may be optimised already, perhaps in a local
@@ -128,8 +141,17 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
 
   std::vector<std::string> choose(Graph& graph) {
     rejected_.clear();
+    agreed_ = false;
     Start best{"as_given", chi2(graph), graph.values(), {}};
     if (!can_place(graph)) return {};
+    if (is_of_relative_poses_alone(graph)) {
+      const double turn = largest_turn(graph);
+      if (turn <= kAgreement) {
+        agreed_ = true;
+        return {fmt::format("{}: no measurement disagrees with its angles by more than {:.2g} rad",
+                            best.in_words(), turn)};
+      }
+    }
     if (std::optional<Start> chordal = compute("chordal", candidates_.chordal.get(), graph))
       keep_better(best, std::move(*chordal), graph);
     const std::int64_t dof = degrees_of_freedom(graph, resolve_gauge(graph));
@@ -268,7 +290,7 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
           "degrees of freedom",
           angle, ratio, dof);
     }
-    if (fall > kLargeFall && angle > kSmallAngle)
+    if (!agreed_ && fall > kLargeFall && angle > kSmallAngle)
       return fmt::format("since chi2 fell {:.3g} times from the start", fall);
     // Where loop closures are few, chi2 is plausible in many minima.
     if (few && static_cast<double>(dof) < kFewLoops * graph.variable_count()) {
@@ -364,6 +386,7 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
   std::string rejected_;  // starts, with the numbers that decided
   GoOn go_on_;
   bool wanted_ = true;
+  bool agreed_ = false;  ///< the given states with all angles
 };
 
 }  // namespace

@@ -74,6 +74,19 @@ TEST_F(Automatic, LeavesAnOptimisedGraphAsItIs) {
   EXPECT_EQ(graph.values().pools, before.pools);
 }
 
+TEST_F(Automatic, TriesNothingWhereTheGivenAnglesAgreeWithAllMeasurements) {
+  Graph graph = std::move(simulate("manhattan:poses=400,rotation_sigma=0.001").graph);
+  const Values given = graph.values();
+  EXPECT_THAT(guess("auto", graph),
+              ElementsAre(AllOf(StartsWith("as_given (chi2"), HasSubstr("no measurement disagrees"),
+                                Not(HasSubstr("chordal")))));
+  EXPECT_EQ(graph.values().pools, given.pools);
+  Graph chordal = graph.clone();
+  guess("chordal", chordal);
+  const double expected = optimize(chordal).final_chi2;
+  EXPECT_NEAR(optimize(graph).final_chi2, expected, 1e-9 * expected);
+}
+
 TEST_F(Automatic, FindsTheMinimumWhereTheGivenStatesEndInAnother) {
   // With this much noise in the headings, steps from odometry end in a local minimum.
   Graph graph = std::move(simulate("manhattan:poses=1500,rotation_sigma=0.1").graph);
