@@ -43,7 +43,7 @@ void CommandSession::perform(std::string_view line, const Words& words, Reply& r
   if (named == commands_.end()) {
     take_data(line, reply);
   } else {
-    named->run(words, reply);
+    named->run(*this, words, reply);
   }
 }
 

@@ -31,18 +31,18 @@ class CAIRN_API CommandSession : public LineSession {
  protected:
   struct Command {
     std::string_view word;
-    std::function<void(const Words&, Reply&)> run;
+    std::function<void(CommandSession&, const Words&, Reply&)> run;
     bool offered = true;  ///< or `run` says why it is not for this session
   };
   template <class Session>
-  Command command(std::string_view word, void (Session::*run)(const Words&, Reply&)) {
-    return {word, [this, run](const Words& words, Reply& reply) {
-              (static_cast<Session*>(this)->*run)(words, reply);
+  static Command command(std::string_view word, void (Session::*run)(const Words&, Reply&)) {
+    return {word, [run](CommandSession& session, const Words& words, Reply& reply) {
+              (static_cast<Session&>(session).*run)(words, reply);
             }};
   }
   /// Of other sessions: it is not offered.
   template <class Session>
-  Command refused(std::string_view word, void (Session::*run)(const Words&, Reply&)) {
+  static Command refused(std::string_view word, void (Session::*run)(const Words&, Reply&)) {
     Command one = command(word, run);
     one.offered = false;
     return one;
