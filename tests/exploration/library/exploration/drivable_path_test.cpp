@@ -127,13 +127,14 @@ TEST(DrivablePath, LeavesAPathAloneThatCanBeFollowed) {
   EXPECT_EQ(same->points, path.points);
 }
 
-/// A room of 3 m × 3 m beside a corridor that is 1 m wide.
-FloorMap room_and_corridor() {
-  return room(80, 32, [](int x, int y) { return x > 30 && (y < 11 || y > 20); });
+/// A room of 3 m × 3 m beside a corridor that is so many cells wide, an even number.
+FloorMap room_and_corridor(int width = 10) {
+  return room(80, 32,
+              [=](int x, int y) { return x > 30 && (y < 16 - width / 2 || y >= 16 + width / 2); });
 }
 
 TEST(DrivablePath, TurnsRoundWhereThereIsRoom) {
-  const FloorMap map = room_and_corridor();
+  const FloorMap map = room_and_corridor(6);
   const RobotModel robot = dubins_robot(0.5);
   // Heads for the room, and the goal is behind it.
   const Pose2 start(4.0, 1.6, pi);
@@ -148,6 +149,45 @@ TEST(DrivablePath, TurnsRoundWhereThereIsRoom) {
   double least = 4.0;
   for (const Vector2d& point : curve->points) least = std::min(least, point.x());
   EXPECT_LT(least, 3.2);
+}
+
+TEST(DrivablePath, TurnsRoundByBackingWhereThatIsShorter) {
+  const FloorMap map = room_and_corridor();
+  const RobotModel robot = dubins_robot(0.5);
+  const Pose2 start(4.0, 1.6, pi);
+  const PlannedPath path{
+      .points = {{4.0, 1.6}, {7.0, 1.6}}, .length = 3.0, .look_at = Vector2d(8.0, 1.6)};
+  const auto curve = drivable_path(path, start, robot, map);
+  ASSERT_TRUE(curve);
+  EXPECT_FALSE(curve->cusps.empty());
+  // By the room it is 8 m.
+  EXPECT_LT(curve->length, 6.0);
+  const Pose2 end = followed(start, *curve, robot, map);
+  EXPECT_LT((end.translation() - Vector2d(7.0, 1.6)).norm(), 0.15);
+}
+
+/// As trees of paths are, whose nodes are not joined for short paths alone.
+TEST(DrivablePath, LeadsAlongWindingPaths) {
+  const int lane = 35, lanes = 3;
+  const FloorMap map = room(160, lanes * lane + 1, [](int x, int y) {
+    return y % lane == 0 && ((y / lane) % 2 == 1 ? x < 130 : x > 30);
+  });
+  PlannedPath path;
+  for (int k = 0; k < lanes; ++k) {
+    for (int i = 0; i <= 12; ++i) {
+      const double along = 1.5 + 13.0 / 12.0 * i, aside = i % 2 == 1 ? 1.2 : -1.2;
+      path.points.emplace_back(k % 2 == 1 ? 16.0 - along : along, 0.1 * lane * (k + 0.5) + aside);
+    }
+  }
+  for (std::size_t k = 1; k < path.points.size(); ++k)
+    path.length += (path.points[k] - path.points[k - 1]).norm();
+  const RobotModel robot = dubins_robot(0.5);
+  const Pose2 start(path.points.front().x(), path.points.front().y(), pi);
+  const auto curve = drivable_path(path, start, robot, map);
+  ASSERT_TRUE(curve);
+  EXPECT_LT(curve->length, 0.5 * path.length);
+  const Pose2 end = followed(start, *curve, robot, map);
+  EXPECT_LT((end.translation() - path.points.back()).norm(), 0.15);
 }
 
 TEST(DrivablePath, ThereIsNoneOnceTheSearchIsInterrupted) {

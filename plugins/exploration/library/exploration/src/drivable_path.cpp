@@ -15,6 +15,7 @@
 #include "arc_length.hpp"
 #include "cairn/exploration/dubins_curve.hpp"
 #include "cairn/exploration/path_planner.hpp"
+#include "path_costs.hpp"
 
 namespace cairn {
 namespace {
@@ -33,9 +34,8 @@ constexpr std::size_t kMostPoses = 60000;
 constexpr std::size_t kTries = 64;
 /// Arcs of the search cross a cell: this long at least [cells].
 constexpr double kArcCells = 1.5;
-/// A metre on an arc costs so much more than a straight one, and so much more for each metre that
-/// it lies away from the path, up to the most.
-constexpr double kTurnCost = 0.05, kAwayCost = 1.0, kMostAway = 1.0;
+/// A metre on an arc costs so much more than a straight one.
+constexpr double kTurnCost = 0.05;
 /// A metre backwards, where the lidar does not look, costs so many metres ahead, and each change of
 /// direction so many [m].
 constexpr double kBackCost = 2.0, kCuspCost = 1.0;
@@ -46,13 +46,6 @@ constexpr double kHeadingStep = pi / 12.0, kSeenPart = 0.4, kMostAside = pi / 3.
 constexpr double kThere = 0.15;
 /// A path is followed on a way that is longer by this factor at most.
 constexpr double kDetour = 1.1;
-
-double distance_to_segment(const Vector2d& point, const Vector2d& a, const Vector2d& b) {
-  const Vector2d along = b - a;
-  const double squared = along.squaredNorm();
-  const double part = squared > 0.0 ? std::clamp((point - a).dot(along) / squared, 0.0, 1.0) : 0.0;
-  return (point - a - part * along).norm();
-}
 
 /// Where a body may be: in cells with some clearance; and a robot that is too near to an obstacle
 /// may leave it, coming no nearer.
@@ -76,6 +69,11 @@ class Room {
     if (here < needed_ && (here <= 0.0 || here < before)) return false;
     before = here;
     return true;
+  }
+  /// Whether a way may lead there as far as the clearance at its ends says, which becomes no less
+  /// than at its start, unless it is enough.
+  bool may_lead(const Vector2d& from, const Vector2d& to) const {
+    return clearance(to) >= std::min(clearance(from), needed_);
   }
 
  private:
@@ -145,7 +143,8 @@ class CurveSearch {
         room_(map, needed),
         radius_(kSpareRadius * robot.turning_radius),
         arc_(std::max(kArcCells * map.frame.resolution, radius_ * 2.0 * pi / kHeadings)),
-        goals_(goals(path, robot)) {
+        goals_(goals(path, robot)),
+        costs_(path, map, needed, interrupt) {
     const int strides = 1 + static_cast<int>(arc_ / room_.stride());
     for (const double way : {1.0, -1.0}) {
       for (const int turn : {0, 1, -1}) {
@@ -162,11 +161,10 @@ class CurveSearch {
 
   /// The points of a curve; none: there is none.
   std::optional<PlannedPath> from(const Pose2& start) {
-    measure_to_goal();
-    if (room_.clearance(start.translation()) >= room_.needed() && !std::isfinite(left(start)))
-      return std::nullopt;
+    const double clearance = room_.clearance(start.translation());
+    if (clearance >= room_.needed() && !std::isfinite(left(start))) return std::nullopt;
     seen_.assign(map_.frame.size() * kHeadings, false);
-    nodes_.push_back({.at = start, .clearance = room_.clearance(start.translation())});
+    nodes_.push_back({.at = start, .clearance = clearance});
     open_.push({left(start), 0});
     std::size_t expanded = 0;
     while (!open_.empty() && expanded < kMostPoses && !interrupted()) {
@@ -227,34 +225,6 @@ class CurveSearch {
     return all;
   }
 
-  /// The distance to the goal over cells where the body fits, by steps to eight neighbours.
-  void measure_to_goal() {
-    const GridFrame& frame = map_.frame;
-    to_goal_.assign(frame.size(), std::numeric_limits<double>::infinity());
-    const std::optional<std::size_t> goal = cell_of(goals_.front().at.translation());
-    if (!goal) return;
-    std::priority_queue<Open, std::vector<Open>, std::greater<>> open;
-    to_goal_[*goal] = 0.0;
-    open.push({0.0, *goal});
-    while (!open.empty() && !interrupted()) {
-      const auto [length, index] = open.top();
-      open.pop();
-      if (length > to_goal_[index]) continue;
-      const int x = static_cast<int>(index) % frame.width;
-      const int y = static_cast<int>(index) / frame.width;
-      for (int dy = -1; dy <= 1; ++dy) {
-        for (int dx = -1; dx <= 1; ++dx) {
-          if (!frame.contains(x + dx, y + dy)) continue;
-          const std::size_t next = frame.index(x + dx, y + dy);
-          const double there = length + frame.resolution * std::hypot(dx, dy);
-          if (map_.clearance[next] < room_.needed() || there >= to_goal_[next]) continue;
-          to_goal_[next] = there;
-          open.push({there, next});
-        }
-      }
-    }
-  }
-
   std::optional<std::size_t> cell_of(const Vector2d& point) const {
     if (room_.clearance(point) < 0.0) return std::nullopt;
     const Vector2d cell = map_.frame.to_cells(point).array().floor();
@@ -269,27 +239,27 @@ class CurveSearch {
     return *cell * kHeadings + static_cast<std::size_t>(heading);
   }
 
-  /// How far it is to the goal, about [m].
+  /// What the way to the goal costs, about.
   double left(const Pose2& at) const {
     const Vector2d apart = goals_.front().at.translation() - at.translation();
     const std::optional<std::size_t> cell = cell_of(at.translation());
     const bool fits = cell && map_.clearance[*cell] >= room_.needed();
-    return fits ? std::max(to_goal_[*cell], apart.norm()) : apart.norm();
+    return fits ? std::max(costs_.to_end(*cell), apart.norm()) : apart.norm();
   }
 
-  double away(const Vector2d& point) const {
-    double least = kMostAway;
-    for (std::size_t k = 1; k < path_.points.size(); ++k)
-      least = std::min(least, distance_to_segment(point, path_.points[k - 1], path_.points[k]));
-    return least;
-  }
-
-  /// Whether the body can go along a curve, `at` of which is a pose for each length.
-  template <class Along>
-  bool is_free(double length, double clearance, Along&& at) const {
-    const int strides = 1 + static_cast<int>(length / room_.stride());
-    for (int k = 1; k <= strides; ++k) {
-      if (!room_.admits(at(length * (double(k) / strides)).translation(), clearance)) return false;
+  /// Whether the body can go along a curve from a node.
+  bool is_free(const DubinsCurve& curve, const Node& from) const {
+    double clearance = from.clearance;
+    Pose2 piece = from.at;  // where it begins
+    for (std::size_t k = 0; k < curve.lengths.size(); ++k) {
+      const double length = curve.lengths[k], curvature = curve.turns[k] / curve.radius;
+      const Eigen::Matrix2d R = piece.rotation().matrix();
+      const int strides = 1 + static_cast<int>(length / room_.stride());
+      for (int stride = 1; stride <= strides; ++stride) {
+        const Vector2d on = along_arc(curvature, length * (double(stride) / strides)).translation();
+        if (!room_.admits(piece.translation() + R * on, clearance)) return false;
+      }
+      piece = piece * along_arc(curvature, length);
     }
     return true;
   }
@@ -310,8 +280,7 @@ class CurveSearch {
     for (const Vector2d& on : arc.on) {
       if (!room_.admits(from.at.translation() + R * on, next.clearance)) return;
     }
-    const double per_metre =
-        1.0 + (turn != 0 ? kTurnCost : 0.0) + kAwayCost * away(next.at.translation());
+    const double per_metre = costs_.per_metre(*key / kHeadings) + (turn != 0 ? kTurnCost : 0.0);
     next.cost = from.cost + arc_ * per_metre * (way < 0.0 ? kBackCost : 1.0) +
                 (way != from.way ? kCuspCost : 0.0);
     open_.push({next.cost + ahead, nodes_.size()});
@@ -342,8 +311,7 @@ class CurveSearch {
   std::optional<DubinsCurve> free_curve(const Node& node, const Pose2& to, double most) const {
     for (const DubinsCurve& curve : dubins_curves(node.at.between(to), radius_)) {
       if (curve.length() >= most) break;
-      const auto at = [&](double length) { return node.at * curve.at(length); };
-      if (is_free(curve.length(), node.clearance, at)) return curve;
+      if (is_free(curve, node)) return curve;
     }
     return std::nullopt;
   }
@@ -410,8 +378,8 @@ class CurveSearch {
   Room room_;
   double radius_, arc_;
   std::vector<Goal> goals_;
+  PathCosts costs_;
   std::vector<Arc> arcs_;
-  std::vector<double> to_goal_;
   std::vector<bool> seen_;  ///< cells and headings that the search has gone on from
   std::vector<Node> nodes_;
   std::priority_queue<Open, std::vector<Open>, std::greater<>> open_;
@@ -429,7 +397,8 @@ std::optional<PlannedPath> drivable_path(PlannedPath path, const Pose2& at, cons
     return is_followed(curve, at, robot, Room(map, clearance));
   };
   if (keeps(path, needed)) return path;
-  const auto curve_with = [&](double clearance) {
+  const auto curve_with = [&](double clearance) -> std::optional<PlannedPath> {
+    if (!Room(map, clearance).may_lead(at.translation(), path.points.back())) return std::nullopt;
     return CurveSearch(path, robot, map, clearance, interrupt).from(at);
   };
   std::optional<PlannedPath> curve = curve_with(needed);
