@@ -42,22 +42,26 @@ double literal_value(const test::PathGraph& graph, const PathValueOptions& optio
   PathInformation information(situation, information_options, no_wall);
   PathInformation::State path = information.start();
   const SeenCells seen(graph.map, graph.robot.lidar, options.simulated_range);
+  const bool turns_in_place = graph.robot.motion != MotionModel::dubins;
   std::set<std::pair<int, int>> cells;
   for (std::size_t k = 1; k < points.size(); ++k) {
     const PlannedPath segment{.points = {points[k]},
                               .length = (points[k] - path.pose().translation()).norm()};
     const std::vector<Pose2> motions = motions_along(path.pose(), segment, graph.robot);
-    double heading = path.pose().theta();  // of the last scan that counts
+    double heading = path.pose().theta(), driven = 0.0;  // of the last scan that counts, and since
     for (std::size_t i = 0; i < motions.size(); ++i) {
       path = information.extended(path, motions[i]);
-      // Scans between two that overlap, on a turn on the spot, do not count.
-      if (i + 1 < motions.size() && motions[i].translation().norm() == 0.0 &&
-          motions[i + 1].translation().norm() == 0.0) {
+      driven += motions[i].translation().norm();
+      // Scans between two that overlap, on a turn on the spot or less than a step along arcs, do
+      // not count.
+      if (i + 1 < motions.size() && driven + motions[i + 1].translation().norm() <=
+                                        (turns_in_place ? 0.0 : graph.robot.step)) {
         const double next = path.pose().theta() + motions[i + 1].theta();
         const double apart = std::abs(std::remainder(next - heading, 2.0 * std::numbers::pi));
         if (apart <= graph.robot.lidar.aperture) continue;
       }
       heading = path.pose().theta();
+      driven = 0.0;
       CellSet set = seen.none();
       set.add(seen.look({&path.pose(), 1}));
       for (int y = 0; y < seen.frame().height; ++y) {
@@ -119,6 +123,24 @@ TEST(PathValue, OfATreeGrownForItIsThatOfEachPathAnew) {
   EXPECT_GT(loops, 10);
   EXPECT_GT(cells, 1000U);
   EXPECT_GT(rewired, 10);
+}
+
+TEST(PathValue, OfATreeForARobotThatCannotTurnInPlaceIsThatOfEachPathAnew) {
+  const PathValueOptions options;
+  test::PathGraph graph = test::partly_explored(3);
+  graph.robot.motion = MotionModel::dubins;
+  const Situation situation = graph.situation();
+  const FreeSpace space(graph.map, graph.pose.translation(), graph.robot.radius);
+  ASSERT_FALSE(space.empty());
+  PathValue value(situation, options);
+  RrtStar<PathValue> tree(space, value, {});
+  RandomNumbers random(3);
+  tree.grow(random, 2.0);
+  ASSERT_GT(tree.size(), 50);
+  for (int k = 1; k < tree.size(); k += 3) {
+    const double expected = literal_value(graph, options, points_to(tree, k));
+    EXPECT_NEAR(tree.value(k), expected, 1e-8 * (1.0 + std::abs(expected))) << k;
+  }
 }
 
 TEST(PathValue, OfATreeOfShortPathsIsThatOfEachPathAnew) {

@@ -24,24 +24,25 @@ bool is_same(const Pose2& a, const Pose2& b) {
          std::abs(std::remainder(a.theta() - b.theta(), 2.0 * std::numbers::pi)) < kRounding;
 }
 
-/// The poses whose scans matter. While it turns on the spot, a scan is left out if the one before
-/// and the one after it overlap.
+/// The poses whose scans matter. Where the one before and the one after it overlap a scan is left
+/// out: while the robot turns on the spot and, along the short motions of one that can't, until it
+/// has driven a step.
 std::vector<Pose2> scanning_poses(const Pose2& start, const std::vector<Pose2>& motions,
-                                  double aperture) {
+                                  const RobotModel& robot) {
+  const double apart = robot.motion == MotionModel::dubins ? robot.step : 0.0;
   std::vector<Pose2> poses;
   Pose2 pose = start;
-  double turned = 0.0;  // since the last scan that counts
+  double driven = 0.0, turned = 0.0;  // since the last scan that counts
   for (std::size_t k = 0; k < motions.size(); ++k) {
     pose = pose * motions[k];
+    driven += motions[k].translation().norm();
     turned += std::abs(motions[k].theta());
-    const auto turns_only = [&](std::size_t i) {
-      return i < motions.size() && motions[i].translation() == Vector2d::Zero();
-    };
-    const bool left_out =
-        turns_only(k) && turns_only(k + 1) && turned + std::abs(motions[k + 1].theta()) <= aperture;
+    const bool left_out = k + 1 < motions.size() &&
+                          driven + motions[k + 1].translation().norm() <= apart &&
+                          turned + std::abs(motions[k + 1].theta()) <= robot.lidar.aperture;
     if (left_out) continue;
     poses.push_back(pose);
-    turned = 0.0;
+    driven = turned = 0.0;
   }
   return poses;
 }
@@ -100,8 +101,7 @@ std::shared_ptr<const PathValue::Segment> PathValue::segment(const Pose2& start,
   segment->start = start;
   const PlannedPath path{.points = {to}, .length = (to - start.translation()).norm()};
   segment->motions = motions_along(start, path, situation_.robot);
-  const std::vector<Pose2> poses =
-      scanning_poses(start, segment->motions, situation_.robot.lidar.aperture);
+  const std::vector<Pose2> poses = scanning_poses(start, segment->motions, situation_.robot);
   if (!poses.empty()) segment->seen = seen_.look(poses);
   return segment;
 }

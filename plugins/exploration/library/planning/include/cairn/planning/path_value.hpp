@@ -62,8 +62,9 @@ struct PathValueOptions {
 ///
 /// with ΔH(x) by `PathInformation`, ΔH(m) by `SeenCells`, and both joined by `JointObjective`.
 /// Below zero is a decrease. (A path shorter than a step counts as one: turning on the spot is not
-/// free.) Every motion that the robot makes on the path is a pose with a scan. Loops are closed
-/// only with poses that no known obstacle hides.
+/// free.) Every motion that the robot makes on the path is a pose. Loops are closed only with poses
+/// that no known obstacle hides. Cells are discovered by the scans at these poses, but for those
+/// between two that overlap: on a turn on the spot, and within a step along arcs.
 ///
 /// It is a `PathCost`, for `RrtStar`: in a tree ΔH(x) is estimated
 /// (`PathInformation::State::estimated_trajectory_change`), and `evaluated` has the exact value.
