@@ -10,6 +10,13 @@ namespace {
 
 using Eigen::Vector2d;
 
+/// Of the grid, and step of positions [m]; step of orientations [rad].
+constexpr double kCell = 0.1, kAngleStep = 0.026;
+/// Standard deviation of the likelihood about a surface [m]: a little more than a cell.
+constexpr double kBlur = 0.12;
+/// Candidates have at least this part of the best one's score, and there are at most so many.
+constexpr double kLeastScore = 0.7;
+constexpr std::ptrdiff_t kMostCandidates = 10;
 /// So many positions are added at a time, which compilers turn into vector instructions.
 constexpr int kLane = 16;
 /// A point adds up to this; so many points at most do not overflow 16 bits.
@@ -90,13 +97,11 @@ bool apart(const Peak& a, const Peak& b) {
 
 }  // namespace
 
-Correlation::Correlation(const SurfaceScan& reference, const SearchWindow& window,
-                         const CorrelationOptions& options)
-    : options_(options),
-      window_(window),
-      reach_x_(steps(window.x, options.cell)),
-      reach_y_(steps(window.y, options.cell)),
-      turns_(steps(window.angle, options.angle_step)),
+Correlation::Correlation(const SurfaceScan& reference, const SearchWindow& window)
+    : window_(window),
+      reach_x_(steps(window.x, kCell)),
+      reach_y_(steps(window.y, kCell)),
+      turns_(steps(window.angle, kAngleStep)),
       row_((2 * reach_x_ + kLane) / kLane * kLane) {
   rasterise(reference);
 }
@@ -109,11 +114,11 @@ void Correlation::rasterise(const SurfaceScan& reference) {
     high = high.cwiseMax(point);
   }
   // A point whose window reaches beyond the table is left out: so it must reach far enough.
-  const double tail = kTail * options_.blur;
-  const Vector2d margin = Vector2d(row_ + 1, 2 * reach_y_ + 1) * options_.cell +
-                          Vector2d::Constant(tail + options_.cell);
+  const double tail = kTail * kBlur;
+  const Vector2d margin =
+      Vector2d(row_ + 1, 2 * reach_y_ + 1) * kCell + Vector2d::Constant(tail + kCell);
   origin_ = low - margin;
-  const Vector2d cells = (high + margin - origin_) / options_.cell;
+  const Vector2d cells = (high + margin - origin_) / kCell;
   width_ = static_cast<int>(cells.x()) + 1;
   height_ = static_cast<int>(cells.y()) + 1;
   table_.assign(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_), 0);
@@ -129,15 +134,15 @@ void Correlation::rasterise(const SurfaceScan& reference) {
     if (!reference.continues(k)) continue;
     const Vector2d gap = reference.point(k + 1) - reference.point(k);
     if (gap.norm() > kJoined) continue;
-    const int pieces = static_cast<int>(gap.norm() / options_.cell) + 1;
+    const int pieces = static_cast<int>(gap.norm() / kCell) + 1;
     for (int piece = 1; piece < pieces; ++piece)
       stamp(reference.point(k) + gap * piece / pieces, likelihood);
   }
 }
 
 void Correlation::stamp(const Vector2d& at, const std::vector<double>& likelihood) {
-  const Vector2d centre = (at - origin_) / options_.cell;
-  const double tail = kTail * options_.blur / options_.cell;
+  const Vector2d centre = (at - origin_) / kCell;
+  const double tail = kTail * kBlur / kCell;
   const double scale = 256.0 / (tail * tail);
   for (int y = static_cast<int>(centre.y() - tail); y <= static_cast<int>(centre.y() + tail); ++y) {
     const std::size_t row = static_cast<std::size_t>(y) * static_cast<std::size_t>(width_);
@@ -155,8 +160,8 @@ void Correlation::stamp(const Vector2d& at, const std::vector<double>& likelihoo
 
 void Correlation::add_scores(std::span<const Vector2d> points, const Vector2d& position,
                              double angle, std::uint16_t* scores) const {
-  const double c = std::cos(angle) / options_.cell, s = std::sin(angle) / options_.cell;
-  const Vector2d from = (position - origin_) / options_.cell;
+  const double c = std::cos(angle) / kCell, s = std::sin(angle) / kCell;
+  const Vector2d from = (position - origin_) / kCell;
   const int rows = 2 * reach_y_ + 1;
   for (const Vector2d& point : points) {
     // The first of the window's cells, as numbers that need not fit into integers.
@@ -191,15 +196,15 @@ std::vector<Candidate> Correlation::search(const SurfaceScan& moving, const Pose
   }
   std::vector<Peak> chosen;
   std::vector<Candidate> candidates;
-  for (const Peak& peak : peaks(scores, options_.least_score)) {
-    if (std::ssize(candidates) >= options_.candidates) break;
+  for (const Peak& peak : peaks(scores, kLeastScore)) {
+    if (std::ssize(candidates) >= kMostCandidates) break;
     if (!std::ranges::all_of(chosen, [&](const Peak& other) { return apart(peak, other); }))
       continue;
     chosen.push_back(peak);
-    candidates.push_back({Pose2(guess.x() + (peak.x - reach_x_) * options_.cell,
-                                guess.y() + (peak.y - reach_y_) * options_.cell,
-                                guess.theta() + (peak.turn - turns_) * turn_step),
-                          peak.score / (kCertain * static_cast<double>(points.size()))});
+    candidates.push_back(
+        {Pose2(guess.x() + (peak.x - reach_x_) * kCell, guess.y() + (peak.y - reach_y_) * kCell,
+               guess.theta() + (peak.turn - turns_) * turn_step),
+         peak.score / (kCertain * static_cast<double>(points.size()))});
   }
   return candidates;
 }

@@ -16,14 +16,6 @@ struct SearchWindow {
   double angle = 0.35;
 };
 
-struct CorrelationOptions {
-  double cell = 0.1;          ///< of the grid, and step of positions [m]
-  double angle_step = 0.026;  ///< of orientations [rad]
-  double blur = 0.12;         ///< standard deviation of the likelihood about a surface [m]
-  double least_score = 0.7;   ///< of a candidate, as a part of the best one's
-  int candidates = 10;        ///< at most
-};
-
 /// A local maximum of the correlation.
 struct Candidate {
   Pose2 pose;
@@ -36,8 +28,7 @@ struct Candidate {
 /// a time, so that all of the window costs less than a millisecond and nothing needs to be bounded.
 class Correlation {
  public:
-  Correlation(const SurfaceScan& reference, const SearchWindow& window,
-              const CorrelationOptions& options = {});
+  Correlation(const SurfaceScan& reference, const SearchWindow& window);
 
   /// The local maxima around a guess of the moving scan's pose, the best first; two of them are
   /// some cells or some steps of the angle apart.
@@ -50,7 +41,6 @@ class Correlation {
   void add_scores(std::span<const Eigen::Vector2d> points, const Eigen::Vector2d& position,
                   double angle, std::uint16_t* scores) const;
 
-  CorrelationOptions options_;
   SearchWindow window_;
   int reach_x_, reach_y_, turns_;  ///< steps to either side
   int row_;                        ///< positions per row of scores, a multiple of what is added

@@ -19,6 +19,8 @@ namespace {
 
 /// How far the truth may be from what is expected, in standard deviations.
 constexpr double kWithin = 3.0;
+/// What may be further off is searched for first [m, rad].
+constexpr double kPoorDistance = 0.3, kPoorAngle = 0.1745;
 
 /// Between the scans that were taken at two poses, as a factor EDGE_SE2. Where there is no scan of
 /// a pose, as of one that was not kept or of an earlier session, there is no match.
@@ -73,10 +75,8 @@ class Icp final : public Registration, public ScanRegistration {
             .angle = reach(covariance(2, 2), most.angle)};
   }
 
-  bool poor(const SearchWindow& window) const {
-    const ScanMatcherOptions& options = matcher_.options();
-    return std::max(window.x, window.y) > options.poor_distance ||
-           window.angle > options.poor_angle;
+  static bool poor(const SearchWindow& window) {
+    return std::max(window.x, window.y) > kPoorDistance || window.angle > kPoorAngle;
   }
 
   std::vector<Factor> measure(Id earlier, Id later, const Pose2& guess,

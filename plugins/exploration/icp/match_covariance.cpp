@@ -15,6 +15,14 @@ using Eigen::Vector3d;
 /// Of a Gaussian: median of |x| over the standard deviation.
 constexpr double kMedian = 0.6745;
 
+/// An observed direction has at least so many times the information of the normals' noise, and at
+/// most this standard deviation [m].
+constexpr double kObserved = 4.0, kMostObserved = 0.3;
+/// Factor on standard deviations, for errors that neighbouring points share.
+constexpr double kInflation = 1.05;
+/// Least standard deviation of any direction [m].
+constexpr double kFloor = 0.001;
+
 /// The distance by which an angle is multiplied to be a length [m].
 double lever(const SurfaceScan& moving, const std::vector<PointMatch>& matches) {
   double sum = 0.0;
@@ -71,7 +79,7 @@ MatchCovariance match_covariance(const SurfaceScan& reference, const SurfaceScan
                                  const std::vector<PointMatch>& matches,
                                  const CovarianceOptions& options) {
   MatchCovariance result;
-  const double least = options.floor * options.floor;
+  const double least = kFloor * kFloor;
   const double unknown = options.unobserved * options.unobserved;
   if (matches.empty()) {
     result.covariance = unknown * Matrix3d::Identity();
@@ -93,14 +101,14 @@ MatchCovariance match_covariance(const SurfaceScan& reference, const SurfaceScan
   const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(H_length);
   const Matrix3d V = D * eigen.eigenvectors();
   const Matrix3d G = V.transpose() * gradient_covariance(reference, moving, matches) * V;
-  const double inflation = std::pow(result.scale * options.inflation, 2);
+  const double inflation = std::pow(result.scale * kInflation, 2);
   // Directions, as columns; error of each per gradient.
   Vector3d gain = Vector3d::Zero();
   for (int k = 0; k < 3; ++k) {
     const double noise = V.col(k).dot(S * V.col(k));
     const double information = eigen.eigenvalues()[k];
-    if (information > options.observed * noise &&
-        inflation * G(k, k) < std::pow(options.most * (information - noise), 2)) {
+    if (information > kObserved * noise &&
+        inflation * G(k, k) < std::pow(kMostObserved * (information - noise), 2)) {
       gain[k] = 1.0 / (information - noise);
     } else {
       ++result.unobserved;

@@ -12,11 +12,7 @@ namespace cairn::icp {
 
 struct CovarianceOptions {
   double unobserved = 1.0;  ///< standard deviation of a direction that is not observed [m]
-  double observed = 4.0;    ///< least information of one that is, in that of the normals' noise
-  double most = 0.3;        ///< largest standard deviation of a direction that is observed [m]
-  double inflation = 1.05;  ///< of standard deviations, for what surfaces have in common
   double tilt = 0.02;       ///< standard deviation of an unobserved direction [rad]
-  double floor = 0.001;     ///< least standard deviation of any direction [m]
 };
 
 struct MatchCovariance {

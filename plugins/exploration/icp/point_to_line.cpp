@@ -25,6 +25,12 @@ constexpr double kBeyond = 0.1;
 constexpr double kNoise = 3.5;
 /// Longest step [m, rad].
 constexpr double kLongest = 0.3;
+/// Factor on the distance of matches per iteration.
+constexpr double kShrink = 0.7;
+/// Part of the matches that is used.
+constexpr double kUsed = 0.95;
+/// Largest angle between the surfaces at a point and its line [rad].
+constexpr double kFacing = 0.7;
 
 /// ∂(v · T exp(ξ) p)/∂ξ for a direction v in the reference's frame, turned into the moving one's.
 Vector3d derivative(const Vector2d& v, const Vector2d& p) {
@@ -57,8 +63,8 @@ Vector3d step(const std::vector<PointMatch>& matches, const SurfaceScan& referen
 
 }  // namespace
 
-void trim(std::vector<PointMatch>& matches, double part) {
-  const auto kept = static_cast<std::ptrdiff_t>(std::ceil(part * std::ssize(matches)));
+void trim(std::vector<PointMatch>& matches) {
+  const auto kept = static_cast<std::ptrdiff_t>(std::ceil(kUsed * std::ssize(matches)));
   if (kept >= std::ssize(matches)) return;
   std::ranges::nth_element(matches, matches.begin() + kept, {}, [](const PointMatch& match) {
     return std::tuple(square_of(match), match.inverse, match.point);
@@ -67,11 +73,11 @@ void trim(std::vector<PointMatch>& matches, double part) {
 }
 
 PointToLine::PointToLine(const SurfaceScan& reference, const SurfaceScan& moving,
-                         const PointToLineOptions& options)
-    : reference_(reference), moving_(moving), options_(options) {
-  const double noise = std::sqrt(reference.range_variance() + moving.range_variance());
-  options_.last_distance = std::max(options_.last_distance, kNoise * noise);
-}
+                         double last_distance)
+    : reference_(reference),
+      moving_(moving),
+      last_distance_(std::max(last_distance, kNoise * std::sqrt(reference.range_variance() +
+                                                                moving.range_variance()))) {}
 
 std::vector<PointMatch> PointToLine::match(const Pose2& pose, double distance) const {
   std::vector<PointMatch> matches;
@@ -86,7 +92,7 @@ void PointToLine::match(const SurfaceScan& lines, const SurfaceScan& points, con
                         double distance, bool inverse, std::vector<PointMatch>& matches) const {
   const Matrix2d R = pose.rotation().matrix();
   const Vector2d t = pose.translation();
-  const double facing = std::cos(options_.normal);
+  const double facing = std::cos(kFacing);
   for (int k = 0; k < points.size(); ++k) {
     const SurfaceLine& own = points.line(k);
     if (!own.exists()) continue;
@@ -120,17 +126,17 @@ void PointToLine::match(const SurfaceScan& lines, const SurfaceScan& points, con
 
 Refinement PointToLine::refine(const Pose2& start, double distance, int iterations) const {
   Refinement result{.pose = start, .matches = {}};
-  distance = std::max(distance, options_.last_distance);
+  distance = std::max(distance, last_distance_);
   for (; result.iterations < iterations && !result.converged; ++result.iterations) {
     std::vector<PointMatch> matches = match(result.pose, distance);
     if (std::ssize(matches) < kFewest) break;
-    trim(matches, options_.trim);
+    trim(matches);
     const Vector3d xi = step(matches, reference_, moving_);
     result.pose = result.pose.retract(xi);
-    result.converged = distance <= options_.last_distance && xi.cwiseAbs().maxCoeff() < kConverged;
-    distance = std::max(options_.last_distance, distance * options_.shrink);
+    result.converged = distance <= last_distance_ && xi.cwiseAbs().maxCoeff() < kConverged;
+    distance = std::max(last_distance_, distance * kShrink);
   }
-  result.matches = match(result.pose, options_.last_distance);
+  result.matches = match(result.pose, last_distance_);
   return result;
 }
 

@@ -22,15 +22,6 @@ struct PointMatch {
   Eigen::Vector3d J_turn;  ///< ∂J/∂(angle of the line's normal)
 };
 
-struct PointToLineOptions {
-  double distance = 0.5;       ///< largest from a point to its line in the first iteration [m]
-  double last_distance = 0.1;  ///< and in the last ones [m]
-  double shrink = 0.7;         ///< of that distance in each iteration
-  double trim = 0.95;          ///< part of the matches that is used, those with the least residuals
-  double normal = 0.7;         ///< largest angle between the surfaces at a point and its line [rad]
-  int iterations = 30;         ///< at most
-};
-
 struct Refinement {
   Pose2 pose;
   std::vector<PointMatch> matches;  ///< at `pose`, before trimming
@@ -55,14 +46,11 @@ struct Refinement {
 /// hardly moves where there is no more than that.
 class PointToLine {
  public:
-  PointToLine(const SurfaceScan& reference, const SurfaceScan& moving,
-              const PointToLineOptions& options = {});
+  /// `last_distance`: largest from a point to its line in the last iterations [m].
+  PointToLine(const SurfaceScan& reference, const SurfaceScan& moving, double last_distance = 0.1);
 
-  Refinement refine(const Pose2& start) const {
-    return refine(start, options_.distance, options_.iterations);
-  }
-  /// From another distance, with fewer iterations.
-  Refinement refine(const Pose2& start, double distance, int iterations) const;
+  /// `distance`: the same in the first iteration.
+  Refinement refine(const Pose2& start, double distance, int iterations = 30) const;
   std::vector<PointMatch> match(const Pose2& pose, double distance) const;
 
  private:
@@ -72,10 +60,10 @@ class PointToLine {
 
   const SurfaceScan& reference_;
   const SurfaceScan& moving_;
-  PointToLineOptions options_;
+  double last_distance_;
 };
 
-/// Those with the least weighted residuals, so large a part of all; the others are removed.
-void trim(std::vector<PointMatch>& matches, double part);
+/// Removes the 5 % with the largest weighted residuals.
+void trim(std::vector<PointMatch>& matches);
 
 }  // namespace cairn::icp

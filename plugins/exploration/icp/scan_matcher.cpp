@@ -12,6 +12,8 @@
 namespace cairn::icp {
 namespace {
 
+/// Largest distance from a point to its line in the first iteration from a good guess [m].
+constexpr double kFirstDistance = 0.5;
 /// A candidate of the search is refined by so many iterations, from this distance [m], before it is
 /// compared with others.
 constexpr int kShort = 6;
@@ -26,6 +28,10 @@ constexpr double kBetter = 0.01;
 constexpr double kSamePosition = 0.1, kSameAngle = 0.05;
 /// … or by as much as the covariance explains, in squared standard deviations.
 constexpr double kExplained = 16.0;
+/// What is accepted has so many points on lines, so large a part of the points in each other's view
+/// that agrees, and a quality that exceeds that of any other pose by so much.
+constexpr int kLeastMatches = 20;
+constexpr double kLeastOverlap = 0.6, kMargin = 0.06;
 /// Ranges agree within so many standard deviations.
 constexpr double kNoise = 3.5;
 
@@ -63,15 +69,14 @@ struct Refined {
 
 ScanMatch ScanMatcher::finish(const SurfaceScan& earlier, const SurfaceScan& later,
                               const Pose2& start, double distance) const {
-  const PointToLine point_to_line(earlier, later, options_.refinement);
-  Refinement refined = point_to_line.refine(start, distance, options_.refinement.iterations);
+  Refinement refined = PointToLine(earlier, later, options_.last_distance).refine(start, distance);
   ScanMatch match;
   match.pose = refined.pose;
   match.iterations = refined.iterations;
   match.matches =
       static_cast<int>(std::ranges::count(refined.matches, false, &PointMatch::inverse));
   match.share = match.matches == 0 ? 0.0 : static_cast<double>(match.matches) / later.line_count();
-  trim(refined.matches, options_.refinement.trim);
+  trim(refined.matches);
   match.rms = rms(refined.matches);
   const MatchCovariance uncertain =
       match_covariance(earlier, later, refined.matches, options_.covariance);
@@ -86,18 +91,18 @@ ScanMatch ScanMatcher::finish(const SurfaceScan& earlier, const SurfaceScan& lat
 
 Verdict ScanMatcher::judge(const ScanMatch& match) const {
   const AcceptanceOptions& least = options_.acceptance;
-  if (match.matches < least.least_matches) return Verdict::few_matches;
-  if (match.visibility.overlap() < least.least_overlap) return Verdict::little_overlap;
+  if (match.matches < kLeastMatches) return Verdict::few_matches;
+  if (match.visibility.overlap() < kLeastOverlap) return Verdict::little_overlap;
   if (match.visibility.conflict() > least.most_conflict) return Verdict::contradiction;
   if (match.rms > least.largest_rms) return Verdict::large_residuals;
   if (match.unobserved == 3) return Verdict::few_matches;
-  if (match.runner_up > match.quality - least.margin) return Verdict::ambiguous;
+  if (match.runner_up > match.quality - kMargin) return Verdict::ambiguous;
   return Verdict::accepted;
 }
 
 ScanMatch ScanMatcher::refine(const SurfaceScan& earlier, const SurfaceScan& later,
                               const Pose2& guess) const {
-  ScanMatch match = finish(earlier, later, guess, options_.refinement.distance);
+  ScanMatch match = finish(earlier, later, guess, kFirstDistance);
   match.verdict = judge(match);
   return match;
 }
@@ -109,7 +114,7 @@ class ScanMatcher::Search {
       : matcher_(matcher),
         earlier_(earlier),
         later_(later),
-        point_to_line_(earlier, later, matcher.options_.refinement),
+        point_to_line_(earlier, later, matcher.options_.last_distance),
         tolerance_(tolerance(earlier, later, matcher.options_.acceptance.tolerance)) {}
 
   void add(const Pose2& start) {
@@ -127,8 +132,7 @@ class ScanMatcher::Search {
     ScanMatch match;
     for (int round = 0; round < kRounds; ++round) {
       const Refined start = best();
-      match =
-          matcher_.finish(earlier_, later_, start.pose, matcher_.options_.refinement.last_distance);
+      match = matcher_.finish(earlier_, later_, start.pose, matcher_.options_.last_distance);
       const bool all = match.unobserved > 0;
       const double reach = all ? std::hypot(window.x, window.y) : kExplored;
       const double spacing = all ? kCoarse : kExploring;
@@ -163,8 +167,7 @@ class ScanMatcher::Search {
 ScanMatch ScanMatcher::search(const SurfaceScan& earlier, const SurfaceScan& later,
                               const Pose2& guess, const SearchWindow& window) const {
   Search search(*this, earlier, later);
-  for (const Candidate& candidate :
-       Correlation(earlier, window, options_.correlation).search(later, guess))
+  for (const Candidate& candidate : Correlation(earlier, window).search(later, guess))
     search.add(candidate.pose);
   if (search.empty()) return {};
   ScanMatch match = search.finish(guess, window);

@@ -29,9 +29,10 @@ constexpr double kGrazing = 0.1;
 /// Surfaces with a larger slope determine the noise of ranges, if there are enough of them.
 constexpr double kFrontal = 0.5;
 constexpr std::ptrdiff_t kEnough = 20;
-/// A neighbourhood's radius is at least so many standard deviations of ranges, and at most so many
-/// times what the options have.
-constexpr double kNoiseRadius = 8.0, kLongest = 2.0;
+/// A line is fitted to a neighbourhood of this radius [m], at least so many standard deviations of
+/// ranges, and at most so many times that radius; and to so many points on each side at least.
+constexpr double kRadius = 0.25, kNoiseRadius = 8.0, kLongest = 2.0;
+constexpr int kNeighbours = 3;
 
 /// Neighbouring points: [first, last].
 struct Window {
@@ -107,13 +108,12 @@ double unbiased_median(const SurfaceLine& line) {
 
 SurfaceScan::SurfaceScan(const LaserScan& scan, const SurfaceOptions& options) : scan_(scan) {
   find_points();
-  fit_lines(options);
+  fit_lines(options, kRadius);
   settle_variances(options);
   // Again, with the noise that was found: with more of it lines are longer.
   SurfaceOptions refined = options;
   refined.sigma = sigma();
-  refined.radius = std::clamp(kNoiseRadius * sigma(), options.radius, kLongest * options.radius);
-  fit_lines(refined);
+  fit_lines(refined, std::clamp(kNoiseRadius * sigma(), kRadius, kLongest * kRadius));
   settle_variances(options);
   std::vector<Vector2d> kept;
   for (int k = 0; k < size(); ++k) {
@@ -149,7 +149,7 @@ void SurfaceScan::find_points() {
   }
 }
 
-void SurfaceScan::fit_lines(const SurfaceOptions& options) {
+void SurfaceScan::fit_lines(const SurfaceOptions& options, double radius) {
   const Moments moments(points_);
   lines_.assign(points_.size(), {});
   const double most = options.roughness * options.roughness;
@@ -161,18 +161,18 @@ void SurfaceScan::fit_lines(const SurfaceOptions& options) {
       const auto goes_on = [&] {
         const int next = end + step;
         return next >= 0 && next < size() && continues(step > 0 ? end : next) &&
-               (std::abs(next - k) <= fewest || (point(next) - point(k)).norm() <= options.radius);
+               (std::abs(next - k) <= fewest || (point(next) - point(k)).norm() <= radius);
       };
       while (goes_on()) end += step;
       return end;
     };
-    const int few = options.neighbours;
-    Window best{reach(-1, few), reach(1, few)};
+    Window best{reach(-1, kNeighbours), reach(1, kNeighbours)};
     const bool one_sided = k - best.first < 2 || best.last - k < 2;
     double least =
         one_sided ? std::numeric_limits<double>::infinity() : moments.variance(best) / kBothSides;
     if (least < noise) least = 0.0;  // as good as can be expected
-    for (const Window& side : {Window{reach(-1, few + 1), k}, Window{k, reach(1, few + 1)}}) {
+    for (const Window& side :
+         {Window{reach(-1, kNeighbours + 1), k}, Window{k, reach(1, kNeighbours + 1)}}) {
       const double variance = moments.variance(side);
       if (variance < least) {
         least = variance;

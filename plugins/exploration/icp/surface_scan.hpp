@@ -32,8 +32,6 @@ struct SurfaceLine {
 /// How surfaces are found in a scan.
 struct SurfaceOptions {
   double sigma = 0.01;      ///< least standard deviation of a range [m]
-  double radius = 0.25;     ///< of the neighbourhood that a line is fitted to [m]
-  int neighbours = 3;       ///< on each side at least
   double roughness = 0.08;  ///< largest standard deviation of points from a line [m]
 };
 
@@ -76,7 +74,8 @@ class SurfaceScan {
 
  private:
   void find_points();
-  void fit_lines(const SurfaceOptions& options);
+  /// `radius`: of the neighbourhood that a line is fitted to [m].
+  void fit_lines(const SurfaceOptions& options, double radius);
   void settle_variances(const SurfaceOptions& options);
 
   LaserScan scan_;

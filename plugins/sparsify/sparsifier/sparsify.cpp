@@ -30,6 +30,8 @@ using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kAskEvery(10);
 /// Nats by which the divergence of a blanket may be off by rounding of its determinants.
 constexpr double kRounding = 1e-9;
+/// Nodes that leave together, at most: their blanket is a dense matrix.
+constexpr std::ptrdiff_t kLargestGroup = 50;
 
 /// B Ω Bᵀ, packed: the information of a choice's models in the residuals of their types. Throws
 /// `Error` (numerical) where rounding has made it indefinite.
@@ -151,8 +153,7 @@ std::vector<std::vector<int>> Sparsify::groups(const WorkGraph& work,
     std::vector<int> group{v};
     for (std::size_t k = 0; options_.scheme != Scheme::single && k < group.size(); ++k) {
       for (const int other : work.blanket({&group[k], 1})) {
-        if (!wanted[other] || static_cast<int>(std::ssize(group)) >= options_.largest_group)
-          continue;
+        if (!wanted[other] || std::ssize(group) >= kLargestGroup) continue;
         if (options_.scheme == Scheme::runs && std::abs(other - group[k]) != 1) continue;
         wanted[other] = false;
         group.push_back(other);

@@ -58,7 +58,6 @@ struct SparsifyOptions {
   Open open = Open::refuse;
   Fit fit = Fit::blanket;
   std::string linear_solver = "block_cholesky";  ///< for `fit`
-  int largest_group = 50;                        ///< nodes that leave together, at most
 
   static auto fields() {
     using O = SparsifyOptions;
@@ -86,9 +85,7 @@ struct SparsifyOptions {
                 "thesis), the same scaled so that the whole graph is as certain as it was, or by "
                 "the covariance in the whole graph (ncfd and fd)")
         .component<LinearSolver>("linear_solver", &O::linear_solver,
-                                 "factorises the whole graph, for fit")
-        .integer("largest_group", &O::largest_group, 1, 100000,
-                 "nodes that leave together, at most");
+                                 "factorises the whole graph, for fit");
   }
 };
 

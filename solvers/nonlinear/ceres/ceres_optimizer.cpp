@@ -52,8 +52,6 @@ class Bridge final : public ceres::IterationCallback {
   }
 
   bool interrupted() const { return interrupted_; }
-  /// Of the estimate, as Ceres sees it.
-  double chi2() const { return chi2_; }
   void rethrow() const {
     if (exception_) std::rethrow_exception(exception_);
   }
@@ -155,8 +153,7 @@ Seconds seconds_of(const ceres::Solver::Summary& ceres) {
 
 }  // namespace
 
-CeresOptimizer::CeresOptimizer(ceres::Solver::Options options, CeresLoss loss)
-    : options_(std::move(options)), loss_(std::move(loss)) {
+CeresOptimizer::CeresOptimizer(ceres::Solver::Options options) : options_(std::move(options)) {
   keep_blas_to_one_thread();
 }
 
@@ -167,11 +164,6 @@ Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& obser
 
 Summary CeresOptimizer::run(Graph& graph, const Stop& stop, Observer& observer) const {
   check(stop);
-  if (graph.has_losses() && loss_.name != "none") {
-    throw Error(
-        ErrorCode::usage,
-        "optimizer ceres: the graph has a loss already; leave out the option loss=" + loss_.name);
-  }
   const Clock::time_point begin = Clock::now();
   const Gauge gauge = resolve_gauge(graph);
   Summary summary =
@@ -184,7 +176,7 @@ Summary CeresOptimizer::run(Graph& graph, const Stop& stop, Observer& observer) 
 
   Values values = graph.values();
   begin_inside(graph, gauge, values, summary);
-  CeresProblem problem(graph, gauge, values, make_ceres_loss(loss_));
+  CeresProblem problem(graph, gauge, values);
   Bridge bridge(graph, values, problem.cost_scale(), stop, observer, summary);
   ceres::Solver::Options options = options_;
   set_limits(stop, options);
@@ -202,7 +194,7 @@ Summary CeresOptimizer::run(Graph& graph, const Stop& stop, Observer& observer) 
   bridge.rethrow();
 
   summary.status = status_of(report, bridge.interrupted());
-  summary.final_chi2 = loss_.name == "none" ? chi2(graph) : bridge.chi2();
+  summary.final_chi2 = chi2(graph);
   if (summary.status == Status::converged &&
       (!std::isfinite(summary.final_chi2) ||
        ended_without_descent(report, state_extent(graph, gauge, graph.values()))))
@@ -210,7 +202,7 @@ Summary CeresOptimizer::run(Graph& graph, const Stop& stop, Observer& observer) 
   summary.notes.push_back("Ceres: " + report.message);
   summary.seconds = seconds_of(report);
   summary.seconds.total = seconds_since(begin);  // without the question that is cairn's own
-  if (summary.status == Status::converged && stop.tolerance > 0.0 && loss_.name == "none") {
+  if (summary.status == Status::converged && stop.tolerance > 0.0) {
     // A step may be short because the trust region is, or beside states far from the origin.
     const NewtonStep left = NewtonDecrement(graph, gauge).at(graph.values());
     if (left.decrease > kCeresRounding * summary.final_chi2 &&

@@ -4,7 +4,6 @@
 #include <ceres/solver.h>
 
 #include "cairn/solve/optimizer.hpp"
-#include "ceres_options.hpp"
 
 namespace cairn {
 
@@ -14,7 +13,7 @@ namespace cairn {
 /// early.
 class CeresOptimizer final : public Optimizer {
  public:
-  CeresOptimizer(ceres::Solver::Options options, CeresLoss loss);
+  explicit CeresOptimizer(ceres::Solver::Options options);
   using Optimizer::optimize;
   Summary optimize(Graph& graph, const Stop& stop, Observer& observer) override;
 
@@ -22,7 +21,6 @@ class CeresOptimizer final : public Optimizer {
   Summary run(Graph& graph, const Stop& stop, Observer& observer) const;
 
   ceres::Solver::Options options_;
-  CeresLoss loss_;
 };
 
 }  // namespace cairn

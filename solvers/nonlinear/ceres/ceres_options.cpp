@@ -21,9 +21,6 @@ ceres::Solver::Options ceres_solver_options(const CeresOptions& options) {
   ceres.linear_solver_type = parsed(options.linear_solver_type, ceres::StringToLinearSolverType);
   ceres.sparse_linear_algebra_library_type =
       parsed(options.sparse_library, ceres::StringToSparseLinearAlgebraLibraryType);
-  ceres.trust_region_strategy_type =
-      parsed(options.trust_region, ceres::StringToTrustRegionStrategyType);
-  ceres.dogleg_type = parsed(options.dogleg, ceres::StringToDoglegType);
   ceres.initial_trust_region_radius = options.initial_radius;
   ceres.logging_type = ceres::SILENT;
   ceres.minimizer_progress_to_stdout = false;
@@ -32,15 +29,6 @@ ceres::Solver::Options ceres_solver_options(const CeresOptions& options) {
                 "optimizer ceres: Ceres does not accept these options: " + problem);
   }
   return ceres;
-}
-
-std::unique_ptr<ceres::LossFunction> make_ceres_loss(const CeresLoss& loss) {
-  if (loss.name == "huber") return std::make_unique<ceres::HuberLoss>(loss.scale);
-  if (loss.name == "soft_l_one") return std::make_unique<ceres::SoftLOneLoss>(loss.scale);
-  if (loss.name == "cauchy") return std::make_unique<ceres::CauchyLoss>(loss.scale);
-  if (loss.name == "arctan") return std::make_unique<ceres::ArctanLoss>(loss.scale);
-  if (loss.name == "tukey") return std::make_unique<ceres::TukeyLoss>(loss.scale);
-  return nullptr;
 }
 
 }  // namespace cairn

@@ -235,13 +235,10 @@ double residual_scale(const Graph& graph) {
 }
 
 CeresProblem::CeresProblem(const Graph& graph, const Gauge& gauge, Values& values,
-                           std::unique_ptr<ceres::LossFunction> loss, const TangentScaling* scaling)
+                           const TangentScaling* scaling)
     : residual_scale_(residual_scale(graph)), problem_(lend_everything()) {
-  const bool own = loss != nullptr;
-  if (own) losses_.push_back(std::move(loss));
-  for (const std::shared_ptr<const Loss>& each : graph.losses()) {
-    if (!own) losses_.push_back(each ? std::make_unique<WrappedLoss>(*each, caught_) : nullptr);
-  }
+  for (const std::shared_ptr<const Loss>& each : graph.losses())
+    losses_.push_back(each ? std::make_unique<WrappedLoss>(*each, caught_) : nullptr);
   for (auto& each : losses_) {
     if (each && residual_scale_ != 1.0)
       each = std::make_unique<ScaledLoss>(std::move(each), residual_scale_);

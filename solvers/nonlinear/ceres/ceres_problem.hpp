@@ -68,11 +68,10 @@ double residual_scale(const Graph& graph);
 /// Ceres' cost is then `cost_scale()` times that of the graph.
 class CeresProblem {
  public:
-  /// `values`, which Ceres moves, must outlive this object. `loss`: a loss of Ceres' own for all
-  /// factors that take one, or null for each factor's own. `scaling`: null for none; not used
+  /// `values`, which Ceres moves, must outlive this object. `scaling`: null for none; not used
   /// after the constructor.
   CeresProblem(const Graph& graph, const Gauge& gauge, Values& values,
-               std::unique_ptr<ceres::LossFunction> loss, const TangentScaling* scaling = nullptr);
+               const TangentScaling* scaling = nullptr);
 
   ceres::Problem& problem() { return problem_; }
   /// 1 unless the information is far from one; a power of four.
@@ -90,7 +89,7 @@ class CeresProblem {
   double residual_scale_;  // a power of two
   // Owned here and only lent to the problem, which therefore is the last to come and the first to
   // go.
-  std::vector<std::unique_ptr<ceres::LossFunction>> losses_;  // as Graph::losses(), or Ceres' own
+  std::vector<std::unique_ptr<ceres::LossFunction>> losses_;  // as Graph::losses()
   std::vector<std::unique_ptr<ceres::Manifold>> manifolds_;   // by variable pool, then scaled ones
   std::vector<std::unique_ptr<ceres::CostFunction>> costs_;
   ceres::Problem problem_;

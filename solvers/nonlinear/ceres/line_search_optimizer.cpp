@@ -81,8 +81,7 @@ class Run final : public ceres::IterationCallback {
     const TangentScaling scaling =
         options.scaling == "none" ? TangentScaling{}
                                   : decrement_.block_jacobi(graph, values_, residual_scale(graph));
-    problem_.emplace(graph, gauge, values_, nullptr,
-                     options.scaling == "none" ? nullptr : &scaling);
+    problem_.emplace(graph, gauge, values_, options.scaling == "none" ? nullptr : &scaling);
   }
 
   /// Searches until it has ended; what a plugin threw meanwhile is thrown then.
@@ -241,8 +240,6 @@ ceres::Solver::Options line_search_solver_options(const LineSearchOptions& optio
   ceres.line_search_type = parsed(options.line_search, ceres::StringToLineSearchType);
   ceres.nonlinear_conjugate_gradient_type =
       parsed(options.conjugate_gradient, ceres::StringToNonlinearConjugateGradientType);
-  ceres.line_search_interpolation_type =
-      parsed(options.interpolation, ceres::StringToLineSearchInterpolationType);
   ceres.max_lbfgs_rank = options.rank;
   ceres.min_line_search_step_size = std::numeric_limits<double>::min();  // in units of Ceres' own
   ceres.logging_type = ceres::SILENT;

@@ -14,7 +14,6 @@ struct LineSearchOptions {
   std::string direction = "lbfgs";
   std::string line_search = "wolfe";
   std::string conjugate_gradient = "fletcher_reeves";
-  std::string interpolation = "cubic";
   int rank = 20;                         ///< pairs of steps and gradients that L-BFGS keeps
   std::string scaling = "block_jacobi";  ///< coordinates in which Ceres works
   int max_size = 3000;                   ///< unknowns, with the dense matrix of BFGS
@@ -32,8 +31,6 @@ struct LineSearchOptions {
         .choice("conjugate_gradient", &O::conjugate_gradient,
                 {"fletcher_reeves", "polak_ribiere", "hestenes_stiefel"},
                 "formula of direction=nonlinear_conjugate_gradient")
-        .choice("interpolation", &O::interpolation, {"cubic", "quadratic", "bisection"},
-                "how the line search finds the length of its next trial step")
         .integer("rank", &O::rank, 1, 1e6,
                  "pairs of steps and gradients that direction=lbfgs keeps")
         .choice(

@@ -7,7 +7,7 @@
 void cairn_register(cairn::Registrar& registrar) {
   using namespace cairn;
   registrar.add<Optimizer, CeresOptions>("ceres", [](const CeresOptions& options) {
-    return std::make_unique<CeresOptimizer>(ceres_solver_options(options), options.loss);
+    return std::make_unique<CeresOptimizer>(ceres_solver_options(options));
   });
   registrar.add<Optimizer, LineSearchOptions>(
       "ceres_line_search", [](const LineSearchOptions& options) {

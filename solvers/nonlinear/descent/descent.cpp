@@ -44,6 +44,9 @@ constexpr int kIterationsForExtent = 2;
 /// What is smaller than this part of the largest diagonal entry is no number in another unit but
 /// rounding.
 constexpr double kUnit = 1e-30;
+/// The diagonal of H counts in damping as at least this part of its largest entry of the same unit:
+/// far below what measurements differ by, far above rounding.
+constexpr double kLeastDiagonal = 1e-12;
 
 /// Where the information of two factors differs by this, H in double precision holds nothing of
 /// the smaller one beside the larger one.
@@ -304,7 +307,7 @@ bool Descent::residual_is_rounding() const {
   return true;
 }
 
-std::vector<double> Descent::min_diagonal(double fraction) const {
+std::vector<double> Descent::min_diagonal() const {
   const BlockStructure& s = equations_->linearizer().structure();
   const std::span<const double> diagonal = equations_->diagonal();
   std::vector<std::vector<double>> largest(graph_.variable_pools().size());
@@ -320,11 +323,11 @@ std::vector<double> Descent::min_diagonal(double fraction) const {
       of_all = std::max(of_all, of_pool[k]);
     }
   }
-  std::vector<double> least(diagonal.size(), fraction * (of_all > 0.0 ? of_all : 1.0));
+  std::vector<double> least(diagonal.size(), kLeastDiagonal * (of_all > 0.0 ? of_all : 1.0));
   for (int block = 0; block < s.blocks(); ++block) {
     const std::vector<double>& of_pool = largest[pool_of(block)];
     for (std::size_t k = 0; k < of_pool.size(); ++k) {
-      if (of_pool[k] > kUnit * of_all) least[s.offsets()[block] + k] = fraction * of_pool[k];
+      if (of_pool[k] > kUnit * of_all) least[s.offsets()[block] + k] = kLeastDiagonal * of_pool[k];
     }
   }
   return least;

@@ -126,10 +126,10 @@ class Descent {
   /// `cairn::state_extent`: the largest of the initial estimate and those of the first iterations.
   double state_extent() const { return state_extent_; }
 
-  /// For each entry of the diagonal of H the least that it counts as in damping: a fraction of the
+  /// For each entry of the diagonal of H the least that it counts as in damping: 1e-12 of the
   /// largest entry of the same unit, that is, for the same number of the tangent space of the same
   /// type of variable; of the largest one of all where those are zero, and of 1 where H is zero.
-  std::vector<double> min_diagonal(double fraction) const;
+  std::vector<double> min_diagonal() const;
 
   /// Leaves the best estimate in the graph.
   Summary finish();

@@ -23,7 +23,7 @@ class Run {
         equations_(descent.equations()),
         convergence_(descent.stop().tolerance),
         path_(descent.step.size()),
-        min_diagonal_(descent.min_diagonal(options.smallest_diagonal)),
+        min_diagonal_(descent.min_diagonal()),
         radius_(std::max(options.initial_radius, std::sqrt(descent.chi2))) {}
 
   void iterate() {

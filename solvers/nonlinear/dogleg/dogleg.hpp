@@ -13,19 +13,13 @@ namespace cairn {
 struct DoglegOptions {
   std::string linear_solver = "block_cholesky";  ///< of the normal equations
   double initial_radius = 1e4;  ///< of the trust region, in the norm of diag(H); at least √chi2
-  /// The diagonal of H counts as at least this fraction of its largest entry of the same unit.
-  double smallest_diagonal = 1e-12;
 
   static auto fields() {
     using O = DoglegOptions;
     return OptionFields<O>()
         .component<LinearSolver>("linear_solver", &O::linear_solver, "solves the normal equations")
         .real("initial_radius", &O::initial_radius, 1e-12, 1e30,
-              "of the trust region, in the norm of diag(H); √chi2 if that is more")
-        .real(
-            "smallest_diagonal", &O::smallest_diagonal, 0.0, 1.0,
-            "lower bound of the diagonal of H in that norm, as a fraction of its largest entry of "
-            "the same unit");
+              "of the trust region, in the norm of diag(H); √chi2 if that is more");
   }
 };
 

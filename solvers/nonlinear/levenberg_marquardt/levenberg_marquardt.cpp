@@ -15,6 +15,8 @@
 namespace cairn {
 namespace {
 
+/// Damping at which the run gives up: no step with more of it changes a state in double precision.
+constexpr double kLargestLambda = 1e16;
 /// Where undamped steps cannot be had, so many damped steps in a row that promise less than the
 /// tolerance count as arrival, and one that is not even kept; only with damping as light as this,
 /// which the first such promise brings about: under a heavy one every promise is small.
@@ -34,9 +36,9 @@ double initial_lambda(const LevenbergMarquardtOptions& options, Descent& descent
 }
 
 /// Undamped steps need an H that is not singular, or one whose null space is known.
-bool may_go_undamped(const LevenbergMarquardtOptions& options, Descent& descent) {
-  return options.endgame && (descent.equations().gauge().left_free.empty() ||
-                             (descent.free().complete && !descent.free().empty()));
+bool may_go_undamped(Descent& descent) {
+  return descent.equations().gauge().left_free.empty() ||
+         (descent.free().complete && !descent.free().empty());
 }
 
 /// One run: the state that its iterations hand on.
@@ -45,13 +47,12 @@ class Run {
   Run(Descent& descent, const LevenbergMarquardtOptions& options)
       : run_(descent),
         equations_(descent.equations()),
-        damping_(initial_lambda(options, descent), 1e-20, options.largest_lambda,
-                 is_hopeful(descent)),
-        may_go_undamped_(may_go_undamped(options, descent)),
+        damping_(initial_lambda(options, descent), 1e-20, kLargestLambda, is_hopeful(descent)),
+        may_go_undamped_(may_go_undamped(descent)),
         endgame_(may_go_undamped_ ? std::sqrt(descent.stop().tolerance) : 0.0),
         convergence_(descent.stop().tolerance),
         damped_by_(descent.step.size()),
-        min_diagonal_(descent.min_diagonal(options.smallest_diagonal)),
+        min_diagonal_(descent.min_diagonal()),
         may_step_beyond_(is_hopeful(descent)) {}
 
   void iterate() {

@@ -18,9 +18,6 @@ struct LevenbergMarquardtOptions {
   /// from linear that a first step with less may throw points behind their cameras, into another
   /// minimum.
   double initial_lambda = 0.0;
-  double largest_lambda = 1e16;      ///< where the run gives up
-  double smallest_diagonal = 1e-12;  ///< D is at least this share of its largest entry of a unit
-  bool endgame = true;               ///< undamped steps near the minimum
 
   static auto fields() {
     using O = LevenbergMarquardtOptions;
@@ -29,13 +26,7 @@ struct LevenbergMarquardtOptions {
         .real(
             "initial_lambda", &O::initial_lambda, 0.0, 1e16,
             "damping of the first step, as a fraction of the diagonal of H; 0: 1e-10, with robust "
-            "losses 1e-6, where the gauge is left free 1e-4")
-        .real("largest_lambda", &O::largest_lambda, 1.0, 1e30, "damping at which the run gives up")
-        .real("smallest_diagonal", &O::smallest_diagonal, 0.0, 1.0,
-              "lower bound of the diagonal of H in the damping, as a fraction of its largest entry "
-              "of the same unit")
-        .boolean("endgame", &O::endgame,
-                 "undamped steps near the minimum, which also judge convergence");
+            "losses 1e-6, where the gauge is left free 1e-4");
   }
 };
 

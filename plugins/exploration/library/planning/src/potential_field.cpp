@@ -141,8 +141,7 @@ PotentialField::Solution PotentialField::solve(double weight, double seconds,
     return std::isinf(seconds) || seconds_since(begin) < seconds;
   };
   const SweepCount count = cairn::solve(grid, weight,
-                                        {.relaxation = options_.relaxation,
-                                         .tolerance = options_.tolerance,
+                                        {.tolerance = options_.tolerance,
                                          .most = options_.sweeps,
                                          .relax_row = relax_row_,
                                          .goes_on = goes_on});

@@ -18,6 +18,9 @@ constexpr std::size_t kFewest = 64;
 /// relative change is none below it: processors take a hundred times as long for such numbers.
 constexpr double kLeast = 1e-290;
 
+/// Factor of over-relaxation at the beginning.
+constexpr double kFirstFactor = 1.8;
+
 std::size_t at(std::int32_t cell) { return static_cast<std::size_t>(cell); }
 
 }  // namespace
@@ -109,7 +112,7 @@ class Relaxation {
         storage_((half_ > 0 ? 2 : 1) * grid.layer() * stride_ + kAligned / sizeof(double)),
         rows_(aligned(storage_)),
         nothing_(stride_, 0.0) {
-    set_factor(weight, options.relaxation);
+    set_factor(weight, kFirstFactor);
     for (std::size_t n = 0; n < grid.layer(); ++n) {
       if (n == 0 || grid.cells[n][1] != grid.cells[n - 1][1]) line_begins_.push_back(n);
       for (std::size_t k = 0; k < turns_; ++k)
@@ -276,8 +279,8 @@ SweepCount solve(PotentialGrid& grid, double weight, const SweepOptions& options
   }
   Relaxation relaxation(grid, weight, options);
   SweepCount count;
-  const double largest = std::max(largest_factor(grid), options.relaxation);
-  double factor = options.relaxation, before = 0.0, rate_before = 0.0;
+  const double largest = std::max(largest_factor(grid), kFirstFactor);
+  double factor = kFirstFactor, before = 0.0, rate_before = 0.0;
   do {
     // The first one alone, if that is all that there is time for.
     const int left = count.sweeps == 0 ? 1 : kTogether - count.sweeps % kTogether;

@@ -40,7 +40,7 @@ struct SweepCount {
 };
 
 struct SweepOptions {
-  double relaxation, tolerance;
+  double tolerance;
   int most;  ///< on each grid
   RelaxRow relax_row;
   std::function<bool()> goes_on;  ///< asked after the first sweep, and after some more each time

@@ -18,9 +18,9 @@ using ::testing::HasSubstr;
 TEST(ComponentOptions, AStructDoesWhatItsTextDoes) {
   Registry registry;
   const LevenbergMarquardtOptions options{.linear_solver = "eigen:ordering=natural",
-                                          .largest_lambda = 10.0};
+                                          .initial_lambda = 10.0};
   EXPECT_EQ(to_text("levenberg_marquardt", options),
-            "levenberg_marquardt:largest_lambda=10,linear_solver=eigen:ordering=natural");
+            "levenberg_marquardt:initial_lambda=10,linear_solver=eigen:ordering=natural");
   EXPECT_NE(registry.make<Optimizer>("levenberg_marquardt", options), nullptr);
 }
 
@@ -34,8 +34,8 @@ TEST(ComponentOptions, AStructIsCheckedLikeText) {
     }
     return "";
   };
-  EXPECT_THAT(refusal({.largest_lambda = 0.5}),
-              HasSubstr("option 'largest_lambda' is '0.5', expected a number, 1 to 1e+30"));
+  EXPECT_THAT(refusal({.initial_lambda = -0.5}),
+              HasSubstr("option 'initial_lambda' is '-0.5', expected a number, 0 to 1e+16"));
   EXPECT_THAT(refusal({.linear_solver = "eigen:ordering=netural"}),
               HasSubstr("option 'ordering' cannot be 'netural'; did you mean 'natural'?"));
 }

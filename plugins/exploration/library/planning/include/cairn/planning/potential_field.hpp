@@ -19,7 +19,7 @@ namespace cairn {
 struct PotentialRows;
 
 struct PotentialFieldOptions {
-  double attractor = 0.6, tolerance = 1e-3, relaxation = 1.8;
+  double attractor = 0.6, tolerance = 1e-3;
   int sweeps = 5000;
 
   static auto fields() {
@@ -29,8 +29,6 @@ struct PotentialFieldOptions {
               "configurations with more than this part of the largest decrease attract")
         .real("tolerance", &O::tolerance, 1e-14, 0.1,
               "relative change in a sweep of smoothing at which the field stands")
-        .real("relaxation", &O::relaxation, 0.01, 1.99,
-              "factor of successive over-relaxation at the beginning")
         .integer("sweeps", &O::sweeps, 1, 1000000, "of smoothing, at most");
   }
 };
