@@ -315,18 +315,19 @@ void check_abilities(const Subject& subject, Checker& check) {
     if (solver.by_jacobian()) return;
     if (auto* ability = query<ManyRightHandSides>(solver.solver())) {
       some = true;
-      const int columns = 5;
-      MatrixXd G = MatrixXd::Zero(n, columns);
-      for (int c = 0; c < columns; ++c) G.col(c) = (1.0 + c) * system.gradient();
-      G.diagonal().array() += 1.0;
-      const auto size = static_cast<std::size_t>(G.size());
-      Guarded in("G", {G.data(), size}), X("X", size);
-      check.call("solve of several right-hand sides", {&in, &X},
-                 [&] { ability->solve(in.span(), X.span(), columns); });
-      const std::vector<double> values = X.values();
-      const MatrixXd expected = Eigen::LDLT<MatrixXd>(H).solve(G);
-      check.within((Map<const MatrixXd>(values.data(), n, columns) - expected).norm(),
-                   solver.accuracy(system) * expected.norm(), "X = H⁻¹ G");
+      for (const int columns : {0, 1, 5, 8, 11}) {
+        MatrixXd G = MatrixXd::Zero(n, columns);
+        for (int c = 0; c < columns; ++c) G.col(c) = (1.0 + c) * system.gradient();
+        G.diagonal().array() += 1.0;
+        const auto size = static_cast<std::size_t>(G.size());
+        Guarded in("G", {G.data(), size}), X("X", size);
+        check.call("solve of several right-hand sides", {&in, &X},
+                   [&] { ability->solve(in.span(), X.span(), columns); });
+        const std::vector<double> values = X.values();
+        const MatrixXd expected = Eigen::LDLT<MatrixXd>(H).solve(G);
+        check.within((Map<const MatrixXd>(values.data(), n, columns) - expected).norm(),
+                     solver.accuracy(system) * expected.norm(), "X = H⁻¹ G");
+      }
     }
     if (auto* ability = query<Marginals>(solver.solver())) {
       some = true;

@@ -99,6 +99,13 @@ TEST_P(OwnPlugin, Conforms) {
   EXPECT_GE(checked.groups.size(), 2U);
 }
 
+TEST(SpatialTypes, ConformInEveryMetric) {
+  const fs::path plugin = fs::path(CAIRN_OWN_PLUGINS) / "slam3d.so";
+  if (!fs::exists(plugin)) GTEST_SKIP() << "there are no types slam3d";
+  for (const std::string metric : {"logarithm", "g2o"})
+    EXPECT_THAT(check(plugin, {"--types", "slam3d:metric=" + metric}).findings, IsEmpty());
+}
+
 /// What the checks say of the wrong factors, computed once.
 const Checked& wrong_factors() {
   static const Checked checked = check(wrong("wrong_factors"), {"--seconds", "20"});

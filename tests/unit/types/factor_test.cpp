@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Laws that every factor type on offer obeys.
+// Laws that every factor type on offer obeys where rotations are of no, tiny and half a turn, in
+// every metric; `cairn plugins --check` has the others.
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
@@ -31,15 +32,6 @@ struct Sample {
     type->evaluate(states().data(), z.data(), whitening.data(), r.data(), nullptr);
     return r;
   }
-  Eigen::MatrixXd whitening() const {
-    const int size = type->residual_size();
-    Eigen::MatrixXd full = Eigen::MatrixXd::Zero(size, size);
-    const double* entry = U.data();
-    for (int row = 0; row < size; ++row) {
-      for (int column = row; column < size; ++column) full(row, column) = *entry++;
-    }
-    return full;
-  }
   std::vector<double> unit_whitening() const {
     std::vector<double> packed;
     for (int row = 0; row < type->residual_size(); ++row) {
@@ -47,18 +39,6 @@ struct Sample {
       packed.insert(packed.end(), type->residual_size() - row - 1, 0.0);
     }
     return packed;
-  }
-  /// The Jacobian of one variable, whitened.
-  std::vector<Eigen::MatrixXd> jacobians() const {
-    std::vector<Eigen::MatrixXd> all;
-    std::vector<double*> pointers;
-    for (int v = 0; v < type->arity(); ++v) {
-      all.emplace_back(type->residual_size(), type->tangent_size(v));
-    }
-    for (auto& J : all) pointers.push_back(J.data());
-    Eigen::VectorXd r(type->residual_size());
-    type->evaluate(states().data(), z.data(), U.data(), r.data(), pointers.data());
-    return all;
   }
 };
 
@@ -94,16 +74,6 @@ void for_every_factor(Check check, const std::string& metric = "") {
   }
 }
 
-TEST(EveryFactor, DeclaresSizesThatFitItsVariables) {
-  for_every_factor([](const Sample& s, const Regime&) {
-    ASSERT_EQ(s.type->arity(), static_cast<int>(s.variables.size()));
-    for (int v = 0; v < s.type->arity(); ++v) {
-      EXPECT_EQ(s.type->tangent_size(v), s.variables[v]->tangent_size());
-      EXPECT_EQ(s.type->ambient_size(v), s.variables[v]->ambient_size());
-    }
-  });
-}
-
 TEST(EveryFactor, HasTheJacobiansThatDifferencesShow) {
   for (const std::string metric : {"logarithm", "g2o", "rotation_vector"}) {
     for_every_factor(
@@ -119,20 +89,6 @@ TEST(EveryFactor, HasTheJacobiansThatDifferencesShow) {
         },
         metric);
   }
-}
-
-TEST(EveryFactor, WhitensItsResidualAndJacobians) {
-  for_every_factor([](const Sample& s, const Regime&) {
-    const Eigen::VectorXd expected = s.whitening() * s.residual(s.unit_whitening());
-    EXPECT_LT((s.residual(s.U) - expected).norm(), 1e-13 * (10.0 + expected.norm()));
-    Sample plain = s;
-    plain.U = s.unit_whitening();
-    const auto whitened = s.jacobians(), raw = plain.jacobians();
-    for (int v = 0; v < s.type->arity(); ++v) {
-      const Eigen::MatrixXd expected_J = s.whitening() * raw[v];
-      EXPECT_LT((whitened[v] - expected_J).norm(), 1e-13 * (10.0 + expected_J.norm()));
-    }
-  });
 }
 
 TEST(EveryFactor, RefusesAMeasurementThatIsNotFinite) {
@@ -178,76 +134,6 @@ TEST(EveryFactor, PropagatesToWhereItsErrorIsZero) {
                            "EDGE_SE3_PRIORVEC 0"})
     EXPECT_FALSE(propagating.contains(part)) << part;
   EXPECT_FALSE(propagating.contains("EDGE_PROJECT_BAL 1"));
-}
-
-/// A pool of one factor seen through the interface of a pool, against `evaluate`.
-void expect_linearized_as_evaluated(const Sample& s, double weight, bool transpose) {
-  const int arity = s.type->arity();
-  const std::vector<std::int32_t> slots(arity, 0);
-  const auto states = s.states();
-  const FactorView pool{1, slots.data(), s.z.data(), s.U.data(), nullptr, states.data()};
-
-  std::vector<double> H, g;
-  std::vector<LinearizeTarget> blocks, gradients;
-  for (int a = 0; a < arity; ++a) {
-    for (int b = a; b < arity; ++b) {
-      blocks.emplace_back(LinearizeTarget::Array::H, H.size(), LinearizeTarget::How::write,
-                          transpose && a != b);
-      H.resize(H.size() + s.type->tangent_size(a) * s.type->tangent_size(b), NAN);
-    }
-    gradients.emplace_back(LinearizeTarget::Array::gradient, g.size(), LinearizeTarget::How::add);
-    g.resize(g.size() + s.type->tangent_size(a), 0.0);
-  }
-  const LinearizeSink sink{{H.data(), g.data()}, blocks.data(), gradients.data()};
-  double squared = 0.0, squared_alone = 0.0;
-  s.type->linearize(pool, 0, 1, &weight, sink, &squared);
-  s.type->squared_norms(pool, 0, 1, &squared_alone);
-
-  const Eigen::VectorXd r = s.residual(s.U);
-  EXPECT_NEAR(squared, r.squaredNorm(), 1e-12 * (1.0 + r.squaredNorm()));
-  EXPECT_NEAR(squared_alone, r.squaredNorm(), 1e-12 * (1.0 + r.squaredNorm()));
-  const auto J = s.jacobians();
-  int pair = 0;
-  for (int a = 0; a < arity; ++a) {
-    const Eigen::VectorXd expected = -weight * J[a].transpose() * r;
-    EXPECT_LT(
-        (Eigen::Map<Eigen::VectorXd>(g.data() + gradients[a].offset(), J[a].cols()) - expected)
-            .norm(),
-        1e-12 * (1.0 + expected.norm()));
-    for (int b = a; b < arity; ++b) {
-      Eigen::MatrixXd block = weight * J[a].transpose() * J[b];
-      if (transpose && a != b) block.transposeInPlace();
-      const Eigen::Map<Eigen::MatrixXd> written(H.data() + blocks[pair++].offset(), block.rows(),
-                                                block.cols());
-      EXPECT_LT((written - block).norm(), 1e-12 * (1.0 + block.norm()));
-    }
-  }
-}
-
-TEST(EveryFactor, LinearizesAPoolAsItEvaluatesOneFactor) {
-  for (const std::string metric : {"logarithm", "g2o", "rotation_vector"}) {
-    for_every_factor(
-        [](const Sample& s, const Regime&) {
-          expect_linearized_as_evaluated(s, 1.0, false);
-          expect_linearized_as_evaluated(s, 0.3, true);
-        },
-        metric);
-  }
-}
-
-TEST(EveryFactor, WritesNothingForVariablesThatAreHeld) {
-  for_every_factor([](const Sample& s, const Regime&) {
-    const int arity = s.type->arity();
-    const std::vector<std::int32_t> slots(arity, 0);
-    const std::vector<LinearizeTarget> nowhere(arity * (arity + 1) / 2);
-    const auto states = s.states();
-    const FactorView pool{1, slots.data(), s.z.data(), s.U.data(), nullptr, states.data()};
-    // A write would go to a null pointer.
-    const LinearizeSink sink{.blocks = nowhere.data(), .gradients = nowhere.data()};
-    double squared = -1.0;
-    s.type->linearize(pool, 0, 1, nullptr, sink, &squared);
-    EXPECT_NEAR(squared, s.residual(s.U).squaredNorm(), 1e-12 * (1.0 + squared));
-  });
 }
 
 TEST(BearingRange, RefusesANegativeRangeAndStandsOnItsLandmark) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What every linear solver owes, whoever wrote it.
+// What every linear solver owes besides what `cairn plugins --check` asks.
 #include "cairn/linear/linear_solver.hpp"
 
 #include <algorithm>
@@ -132,57 +132,6 @@ TEST_P(LinearSolverTest, StartsNoThreadWhereOneIsAllowed) {
   EXPECT_LE(tasks(), before);
 }
 
-TEST_P(LinearSolverTest, FactorizesNewValuesWithoutANewAnalysis) {
-  for (const NamedStructure& sample : sample_structures()) {
-    SCOPED_TRACE(sample.name);
-    BlockMatrix H(sample.structure);
-    solver_->analyze(sample.structure);
-    for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-      fill_positive_definite(H, seed, 0.01 * static_cast<double>(seed));
-      expect_agreement(*solver_, H, seed + 10);
-    }
-  }
-}
-
-TEST_P(LinearSolverTest, SolvesSeveralRightHandSidesInPlace) {
-  const BlockStructure structure = sample_structures().back().structure;
-  BlockMatrix H(structure);
-  fill_positive_definite(H, 5);
-  solver_->analyze(structure);
-  ASSERT_TRUE(solver_->factorize(H).ok);
-  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
-    const Eigen::VectorXd g = random_vector(structure.size(), seed);
-    const Eigen::VectorXd apart = solve(*solver_, g);
-    Eigen::VectorXd in_place = g;
-    const std::span<double> both(in_place.data(), static_cast<std::size_t>(in_place.size()));
-    solver_->solve(both, both);
-    EXPECT_EQ(in_place, apart);
-    EXPECT_LE((dense(H) * apart - g).norm(), 1e-9 * g.norm());
-  }
-}
-
-TEST_P(LinearSolverTest, SolvesForManyRightHandSidesIfItCan) {
-  auto* many = query<ManyRightHandSides>(*solver_);
-  if (!many) GTEST_SKIP() << GetParam() << " solves for one at a time";
-  const BlockStructure structure = sample_structures()[10].structure;
-  BlockMatrix H(structure);
-  fill_positive_definite(H, 18);
-  solver_->analyze(structure);
-  ASSERT_TRUE(solver_->factorize(H).ok);
-  many->solve({}, {}, 0);
-  for (const int columns : {1, 5, 8, 11, 2}) {
-    Eigen::MatrixXd X(structure.size(), columns);
-    for (int c = 0; c < columns; ++c)
-      X.col(c) = random_vector(structure.size(), std::uint64_t{19} + static_cast<std::uint64_t>(c));
-    const Eigen::MatrixXd G = X;
-    const std::span<double> values(X.data(), static_cast<std::size_t>(X.size()));
-    many->solve(values, values, columns);
-    EXPECT_LE((dense(H) * X - G).norm(), 1e-9 * G.norm()) << columns;
-    const Eigen::VectorXd one = solve(*solver_, G.col(0));
-    EXPECT_LE((X.col(0) - one).norm(), 1e-9 * one.norm());
-  }
-}
-
 TEST_P(LinearSolverTest, NamesTheBlockAtWhichTheMatrixIsNotPositiveDefinite) {
   for (const NamedStructure& sample : sample_structures()) {
     SCOPED_TRACE(sample.name);
@@ -198,57 +147,6 @@ TEST_P(LinearSolverTest, NamesTheBlockAtWhichTheMatrixIsNotPositiveDefinite) {
       EXPECT_FALSE(factorization.ok);
       EXPECT_EQ(factorization.failed_block, spoilt);
     }
-  }
-}
-
-TEST_P(LinearSolverTest, RecoversFromAFailure) {
-  for (const NamedStructure& sample : sample_structures()) {
-    SCOPED_TRACE(sample.name);
-    BlockMatrix H(sample.structure);
-    solver_->analyze(sample.structure);
-    fill_positive_definite(H, 7);
-    spoil(H, sample.structure.blocks() / 2);
-    ASSERT_FALSE(solver_->factorize(H).ok);
-    fill_positive_definite(H, 8);
-    expect_agreement(*solver_, H, 9);
-  }
-}
-
-TEST_P(LinearSolverTest, RefusesAZeroMatrixAndValuesThatAreNotFinite) {
-  for (const NamedStructure& sample : sample_structures()) {
-    SCOPED_TRACE(sample.name);
-    const int blocks = sample.structure.blocks();
-    solver_->analyze(sample.structure);
-    BlockMatrix zero(sample.structure);
-    const Factorization of_zero = solver_->factorize(zero);
-    EXPECT_FALSE(of_zero.ok);
-    EXPECT_TRUE(of_zero.failed_block >= 0 && of_zero.failed_block < blocks) << of_zero.failed_block;
-    for (const double value :
-         {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
-      BlockMatrix H(sample.structure);
-      fill_positive_definite(H, 10);
-      H.block(sample.structure.column_begin()[blocks / 2])[0] = value;
-      const Factorization factorization = solver_->factorize(H);
-      EXPECT_FALSE(factorization.ok) << value;
-      EXPECT_LT(factorization.failed_block, blocks);
-    }
-    BlockMatrix H(sample.structure);
-    fill_positive_definite(H, 11);
-    expect_agreement(*solver_, H, 12);
-  }
-}
-
-TEST_P(LinearSolverTest, TellsItsLogDeterminantIfItCan) {
-  auto* ability = query<LogDeterminant>(*solver_);
-  if (!ability) GTEST_SKIP() << GetParam() << " has no log determinant";
-  for (const NamedStructure& sample : sample_structures()) {
-    SCOPED_TRACE(sample.name);
-    BlockMatrix H(sample.structure);
-    fill_positive_definite(H, 13);
-    solver_->analyze(sample.structure);
-    ASSERT_TRUE(solver_->factorize(H).ok);
-    const double expected = log_determinant_of(dense(H));
-    EXPECT_NEAR(ability->log_determinant(), expected, 1e-9 * (1.0 + std::abs(expected)));
   }
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What every optimizer owes, whoever wrote it.
+// What every optimizer owes besides what `cairn plugins --check` asks.
 #include "cairn/solve/optimizer.hpp"
 
 #include <algorithm>
@@ -176,16 +176,6 @@ TEST_P(OptimizerTest, RunsExactlyTheIterationsAskedFor) {
   }
 }
 
-TEST_P(OptimizerTest, DoesNothingInNoIterations) {
-  Graph graph = ring_of_poses(20, 0.1);
-  const double before = chi2_of(graph);
-  const Summary summary = optimizer_->optimize(graph, Stop{.max_iterations = 0});
-  EXPECT_EQ(summary.status, Status::max_iterations);
-  EXPECT_TRUE(summary.iterations.empty());
-  EXPECT_NEAR(summary.initial_chi2, before, 1e-13 * before);
-  EXPECT_EQ(chi2_of(graph), before);
-}
-
 TEST_P(OptimizerTest, TellsTheObserverOfEachIteration) {
   Graph graph = ring_of_poses(30, 0.1);
   const double before = chi2_of(graph);
@@ -205,66 +195,6 @@ TEST_P(OptimizerTest, TellsTheObserverOfEachIteration) {
   EXPECT_NEAR(summary.final_chi2, best, 1e-12 * before);
 }
 
-TEST_P(OptimizerTest, StopsWhenTheObserverSaysSo) {
-  Graph graph = ring_of_poses(30, 0.1);
-  Recorder recorder;
-  recorder.after = [](const Iteration& iteration) { return iteration.number < 2; };
-  const Summary summary = optimizer_->optimize(graph, Stop{.tolerance = 0.0}, recorder);
-  EXPECT_EQ(summary.status, Status::interrupted);
-  EXPECT_EQ(summary.iterations.size(), 2U);
-  EXPECT_LT(summary.final_chi2, summary.initial_chi2);
-  EXPECT_NEAR(chi2_of(graph), recorder.best_chi2.back(), 1e-12 * summary.final_chi2);
-}
-
-TEST_P(OptimizerTest, StopsWithTheBestEstimateWhenInterrupted) {
-  std::atomic<bool> interrupt = false;
-  Graph graph = ring_of_poses(30, 0.1);
-  Recorder recorder;
-  recorder.after = [&](const Iteration& iteration) {
-    interrupt = iteration.number == 2;
-    return true;
-  };
-  const Stop stop{.tolerance = 0.0, .interrupt = &interrupt};
-  const Summary summary = optimizer_->optimize(graph, stop, recorder);
-  EXPECT_EQ(summary.status, Status::interrupted);
-  EXPECT_EQ(summary.iterations.size(), 2U);
-  EXPECT_EQ(summary.final_chi2, chi2_of(graph));
-  EXPECT_LT(summary.final_chi2, summary.initial_chi2);
-}
-
-TEST_P(OptimizerTest, DoesNotBeginWhenAlreadyInterrupted) {
-  const std::atomic<bool> interrupt = true;
-  Graph graph = ring_of_poses(30, 0.1);
-  const double before = chi2_of(graph);
-  const Summary summary = optimizer_->optimize(graph, Stop{.interrupt = &interrupt});
-  EXPECT_EQ(summary.status, Status::interrupted);
-  EXPECT_TRUE(summary.iterations.empty());
-  EXPECT_EQ(chi2_of(graph), before);
-}
-
-TEST_P(OptimizerTest, KeepsToItsTime) {
-  Graph graph = ring_of_poses(30, 0.1);
-  const Summary summary = optimizer_->optimize(graph, Stop{.tolerance = 0.0, .max_seconds = 1e-9});
-  EXPECT_EQ(summary.status, Status::max_iterations);
-  EXPECT_LE(summary.iterations.size(), 1U);
-}
-
-TEST_P(OptimizerTest, RefusesLimitsThatAreNone) {
-  Graph graph = ring_of_poses(30, 0.1);
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  for (const Stop& stop :
-       {Stop{.max_iterations = -5}, Stop{.tolerance = nan}, Stop{.tolerance = -1.0},
-        Stop{.tolerance = 2.0}, Stop{.max_seconds = nan}, Stop{.max_seconds = -1.0}}) {
-    try {
-      optimizer_->optimize(graph, stop);
-      ADD_FAILURE() << stop.max_iterations << ' ' << stop.tolerance << ' ' << stop.max_seconds;
-    } catch (const Error& error) {
-      EXPECT_EQ(error.code(), ErrorCode::usage);
-      EXPECT_THAT(error.what(), HasSubstr(": expected "));
-    }
-  }
-}
-
 TEST_P(OptimizerTest, AnchorsAFreeGaugeAndSaysSo) {
   Graph graph = ring_of_poses(20, 0.1);
   const std::vector<double> first(graph.state(0).begin(), graph.state(0).end());
@@ -274,21 +204,6 @@ TEST_P(OptimizerTest, AnchorsAFreeGaugeAndSaysSo) {
   EXPECT_THAT(recorder.messages, Contains(HasSubstr("VERTEX_SE2 0")));
   EXPECT_THAT(graph.state(0), testing::ElementsAreArray(first));
   EXPECT_FALSE(graph.fixed(0)) << "an anchor is not the graph's";
-}
-
-TEST_P(OptimizerTest, LeavesFixedVariablesWhereTheyAre) {
-  Graph graph = ring_of_poses(20, 0.1);
-  graph.set_fixed(7);
-  graph.set_fixed(11);
-  const std::vector<double> seventh(graph.state(7).begin(), graph.state(7).end());
-  const std::vector<double> eleventh(graph.state(11).begin(), graph.state(11).end());
-  const double expected = dense_minimum(graph);
-  const Summary summary = optimizer_->optimize(graph);
-  if (!falls_short(summary.status)) {
-    EXPECT_NEAR(summary.final_chi2, expected, 1e-8 * expected);
-  }
-  EXPECT_THAT(graph.state(7), testing::ElementsAreArray(seventh));
-  EXPECT_THAT(graph.state(11), testing::ElementsAreArray(eleventh));
 }
 
 TEST_P(OptimizerTest, ConvergesAtOnceWhereEverythingIsHeld) {
@@ -329,16 +244,6 @@ TEST_P(OptimizerTest, GivesTheSameBitsForAnyNumberOfThreads) {
     } else {
       EXPECT_EQ(graph.values().pools, first.values().pools) << count << " threads";
     }
-  }
-}
-
-TEST_P(OptimizerTest, OptimizesOneGraphAfterAnother) {
-  for (const int poses : {12, 40, 12}) {
-    Graph graph = ring_of_poses(poses, 0.1);
-    const double expected = dense_minimum(graph);
-    const Summary summary = optimizer_->optimize(graph);
-    if (falls_short(summary.status)) continue;
-    EXPECT_NEAR(summary.final_chi2, expected, 1e-8 * expected);
   }
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Laws that every loss on offer obeys, and the shapes of ours.
+// The shapes of our losses; `cairn plugins --check` has the laws of all.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -48,30 +48,6 @@ TEST(Losses, AreOnOfferByName) {
   }
 }
 
-TEST(EveryLoss, IsAlmostTheSquareNearZero) {
-  for_every_loss([](const Loss& loss) {
-    EXPECT_EQ(rho(loss, 0.0), 0.0);
-    EXPECT_EQ(weight(loss, 0.0), 1.0);
-    for (const double s : {1e-30, 1e-12, 1e-6}) {
-      EXPECT_NEAR(rho(loss, s) / s, 1.0, 10.0 * s + 1e-15);
-      EXPECT_NEAR(weight(loss, s), 1.0, 10.0 * s + 1e-15);
-    }
-  });
-}
-
-TEST(EveryLoss, HasTheDerivativesThatDifferencesShow) {
-  for_every_loss([](const Loss& loss) {
-    // Between the corners of huber, tukey and dcs, with their default scales.
-    for (const double s : {0.01, 0.3, 0.9, 1.2, 1.7, 1.9, 3.0, 5.0, 9.3, 20.0, 23.5, 100.0, 1e4}) {
-      const double h = 1e-5 * s;
-      const double slope = (rho(loss, s + h) - rho(loss, s - h)) / (2 * h);
-      EXPECT_NEAR(weight(loss, s), slope, 1e-8 * (1.0 + rho(loss, s) / s)) << s;
-      const double bend = (weight(loss, s + h) - weight(loss, s - h)) / (2 * h);
-      EXPECT_NEAR(loss.second_derivative(s), bend, 1e-8 * (1.0 + std::abs(bend) + 1.0 / s)) << s;
-    }
-  });
-}
-
 TEST(EveryLoss, NeverPullsHarderThanTheSquareAndNeverPushes) {
   for_every_loss([](const Loss& loss) {
     double last_rho = 0.0, last_weight = 1.0;
@@ -96,18 +72,6 @@ TEST(EveryLoss, IsContinuousAtItsCorner) {
     EXPECT_NEAR(rho(*loss, below), rho(*loss, above), 1e-10);
     EXPECT_NEAR(weight(*loss, below), weight(*loss, above), 1e-10);
   }
-}
-
-TEST(EveryLoss, TakesBatches) {
-  for_every_loss([](const Loss& loss) {
-    const std::array<double, 4> s = {0.0, 0.5, 3.0, 100.0};
-    std::array<double, 4> rhos{}, weights{};
-    loss.evaluate(s, rhos, weights);
-    for (std::size_t k = 0; k < s.size(); ++k) {
-      EXPECT_EQ(rhos[k], rho(loss, s[k]));
-      EXPECT_EQ(weights[k], weight(loss, s[k]));
-    }
-  });
 }
 
 TEST(EveryLoss, ScalesWithItsOption) {
