@@ -6,8 +6,6 @@ namespace cairn::app {
 void add_explore(Registrar& registrar);
 void add_floor_input(Registrar& registrar);
 void add_map(Registrar& registrar);
-void add_study_objective(Registrar& registrar);
-void add_study_optimality(Registrar& registrar);
 }  // namespace cairn::app
 
 void cairn_register(cairn::Registrar& registrar) {
@@ -15,6 +13,4 @@ void cairn_register(cairn::Registrar& registrar) {
   add_explore(registrar);
   add_floor_input(registrar);
   add_map(registrar);
-  add_study_objective(registrar);
-  add_study_optimality(registrar);
 }

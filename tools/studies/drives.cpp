@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "study_drives.hpp"
+#include "drives.hpp"
 
 #include "cairn/program/command.hpp"
 #include "floors.hpp"

@@ -24,9 +24,10 @@ TEST_F(StudyObjective, ComparesEachFormOnTheSamePathsAndCanBeRepeated) {
   const std::string report = folder_.file("tau.json"), first = folder_.file("a.csv"),
                     second = folder_.file("b.csv");
   for (const std::string& paths : {first, second}) {
-    const Outcome run = cairn({"study", "objective", "@rooms:width=10,height=8,seed=2",
-                               "--distance", "10", "--decisions", "2", "--candidates", "4",
-                               "--samples", "4", "--paths", paths, "--json", report});
+    const Outcome run =
+        cairn({"study", "objective", "--plugin", CAIRN_STUDIES, "@rooms:width=10,height=8,seed=2",
+               "--distance", "10", "--decisions", "2", "--candidates", "4", "--samples", "4",
+               "--paths", paths, "--json", report});
     ASSERT_EQ(run.exit_code, 0) << run.err;
     EXPECT_THAT(run.out, HasSubstr("alpha=end,reference=cell,power=1"));
   }
@@ -46,7 +47,8 @@ TEST_F(StudyObjective, ComparesEachFormOnTheSamePathsAndCanBeRepeated) {
 }
 
 TEST_F(StudyObjective, RefusesLessThanTwoSamples) {
-  const Outcome run = cairn({"study", "objective", "@rooms", "--samples", "1"});
+  const Outcome run =
+      cairn({"study", "objective", "--plugin", CAIRN_STUDIES, "@rooms", "--samples", "1"});
   EXPECT_EQ(run.exit_code, 2);
   EXPECT_THAT(run.err, HasSubstr("--samples"));
 }

@@ -9,7 +9,6 @@
 
 #include "cairn/exploration/floor_map.hpp"
 #include "cairn/exploration/laser_scan.hpp"
-#include "cairn/runtime/api.hpp"
 #include "cairn/typed/pose2.hpp"
 
 namespace cairn {
@@ -44,8 +43,8 @@ struct SampledMapEntropy {
 /// the same errors. Takes samples + 1 maps; `mapper` is reset. Throws `Error` (usage) for less than
 /// two samples, sizes that do not fit, or a scan at a pose that is not there, (numerical) if Σ is
 /// not positive semidefinite or not finite.
-CAIRN_API SampledMapEntropy sampled_map_entropy(const PoseGaussian& poses,
-                                                std::span<const AttachedScan> scans, Mapper& mapper,
-                                                int samples, std::uint64_t seed);
+SampledMapEntropy sampled_map_entropy(const PoseGaussian& poses,
+                                      std::span<const AttachedScan> scans, Mapper& mapper,
+                                      int samples, std::uint64_t seed);
 
 }  // namespace cairn

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/evaluation/rank_correlation.hpp"
+#include "rank_correlation.hpp"
 
 #include <cmath>
 #include <cstddef>

@@ -19,9 +19,9 @@ class StudyOptimality : public ExplorationCommands {
     need({{"registration", "simulated"}, {"linear_solver", "block_cholesky"}});
   }
   static Outcome study(const Arguments& more) {
-    return run(
-        {"study", "optimality", "@rooms:width=12,height=9,seed=2", "--registration", kTrueMatcher},
-        more);
+    return run({"study", "optimality", "--plugin", CAIRN_STUDIES, "@rooms:width=12,height=9,seed=2",
+                "--registration", kTrueMatcher},
+               more);
   }
 };
 

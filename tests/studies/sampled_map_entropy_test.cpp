@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/planning/sampled_map_entropy.hpp"
+#include "sampled_map_entropy.hpp"
 
 #include <cmath>
 #include <limits>

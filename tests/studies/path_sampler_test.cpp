@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/planning/path_sampler.hpp"
+#include "path_sampler.hpp"
 
 #include <cmath>
 #include <memory>

@@ -10,9 +10,8 @@
 
 #include "cairn/exploration/explorer.hpp"
 #include "cairn/planning/path_information.hpp"
-#include "cairn/planning/sampled_map_entropy.hpp"
 #include "cairn/plugin/registry.hpp"
-#include "cairn/runtime/api.hpp"
+#include "sampled_map_entropy.hpp"
 
 namespace cairn {
 
@@ -39,7 +38,7 @@ struct PathSamplerOptions {
 /// estimator the path gets its poses and loop closures, and each of its poses a scan as the map
 /// lets expect it: beams end at known obstacles, and what is unknown is free up to the simulated
 /// range. Both integrals, before and after, are by the same samples.
-class CAIRN_API PathSampler {
+class PathSampler {
  public:
   /// `scans` and `poses`: all that the map was made of, and where each was taken; scan k belongs to
   /// the last pose of the graph with an id up to k. `registry`: of the types of poses and factors.

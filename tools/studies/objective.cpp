@@ -18,12 +18,10 @@
 #include <Eigen/LU>
 
 #include "cairn/evaluation/mean_interval.hpp"
-#include "cairn/evaluation/rank_correlation.hpp"
 #include "cairn/exploration/exploration.hpp"
 #include "cairn/exploration/random_stream.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/planning/joint_objective.hpp"
-#include "cairn/planning/path_sampler.hpp"
 #include "cairn/plugin/options.hpp"
 #include "cairn/program/command.hpp"
 #include "cairn/program/graph_files.hpp"
@@ -33,8 +31,10 @@
 #include "cairn/program/table.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
-#include "study_drives.hpp"
-#include "study_paths.hpp"
+#include "drives.hpp"
+#include "path_sampler.hpp"
+#include "random_paths.hpp"
+#include "rank_correlation.hpp"
 
 namespace cairn::app {
 namespace {

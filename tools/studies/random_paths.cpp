@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "study_paths.hpp"
+#include "random_paths.hpp"
 
 #include <cstddef>
 #include <optional>

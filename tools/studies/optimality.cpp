@@ -13,7 +13,6 @@
 #include <boost/json/object.hpp>
 
 #include "cairn/evaluation/mean_interval.hpp"
-#include "cairn/evaluation/rank_correlation.hpp"
 #include "cairn/exploration/exploration.hpp"
 #include "cairn/exploration/random_stream.hpp"
 #include "cairn/planning/path_motions.hpp"
@@ -23,8 +22,9 @@
 #include "cairn/program/results.hpp"
 #include "cairn/program/session.hpp"
 #include "cairn/program/table.hpp"
-#include "study_drives.hpp"
-#include "study_paths.hpp"
+#include "drives.hpp"
+#include "random_paths.hpp"
+#include "rank_correlation.hpp"
 
 namespace cairn::app {
 namespace {
