@@ -64,7 +64,6 @@ class Chains {
   std::span<const Copy> copies() const { return copies_; }
 
  private:
-  void cut_paths(const BlockStructure& structure, std::span<const std::int32_t> degree_two);
   void group_equal_lengths();
   void build_rest(const BlockStructure& structure);
   void place_numbers(const BlockStructure& structure);

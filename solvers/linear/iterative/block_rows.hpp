@@ -30,9 +30,6 @@ class BlockRows {
   /// y -= Σ_{j≠i} H_ij x_j for one block row i, y being of its size: a step of relaxation.
   void subtract_neighbours(int i, const double* x, double* y) const;
 
-  /// Block rows that one task takes: chunk c is [chunk_begin()[c], chunk_begin()[c + 1]).
-  std::span<const std::int32_t> chunk_begin() const { return chunk_begin_; }
-
  private:
   struct Entry {
     std::int32_t column;  // block
@@ -47,7 +44,7 @@ class BlockRows {
   const BlockStructure* structure_ = nullptr;
   std::vector<std::int64_t> row_begin_;
   std::vector<Entry> entries_;
-  std::vector<std::int32_t> chunk_begin_;
+  std::vector<std::int32_t> chunk_begin_;  // of the block rows that one task takes, and their end
   AlignedVector values_;
   mutable std::vector<double> partial_;  // by chunk
 };

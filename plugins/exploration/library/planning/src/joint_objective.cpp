@@ -2,19 +2,10 @@
 #include "cairn/planning/joint_objective.hpp"
 
 #include <cmath>
-#include <limits>
-#include <numbers>
 
 #include <Eigen/LU>
 
 namespace cairn {
-
-double pose_entropy(const Eigen::Matrix3d& covariance, EntropyForm form) {
-  const double determinant = covariance.determinant();
-  if (!(determinant > 0.0)) return -std::numeric_limits<double>::infinity();
-  const double constant = 1.5 * std::log(2.0 * std::numbers::pi * std::numbers::e);
-  return constant + (form == EntropyForm::standard ? 0.5 : 1.0) * std::log(determinant);
-}
 
 JointObjective::JointObjective(const JointObjectiveOptions& options, double resolution,
                                double range)

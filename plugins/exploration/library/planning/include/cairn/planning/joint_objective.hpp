@@ -60,9 +60,6 @@ struct JointObjectiveOptions {
   }
 };
 
-/// The entropy of a Gaussian of three dimensions [nats]; −∞ where |Σ| is not above zero.
-CAIRN_API double pose_entropy(const Eigen::Matrix3d& covariance, EntropyForm form);
-
 class CAIRN_API JointObjective {
  public:
   /// `resolution`: side of a cell [m]; `range`: of the lidar [m].
