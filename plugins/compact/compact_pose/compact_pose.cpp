@@ -3,9 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
-#include <limits>
-#include <set>
+#include <iterator>
 #include <utility>
 
 #include <fmt/core.h>
@@ -20,27 +18,13 @@
 namespace cairn::compact {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-/// Links that wait: older ones are given up when there are more.
-constexpr std::size_t kMostWaiting = 32;
-/// Refused matches that are remembered, and of how many other poses some have to agree with one of
-/// them to doubt odometry.
-constexpr std::size_t kMostRefused = 32;
-constexpr std::size_t kAgreeing = 3;
-
-/// What a measurement of a landmark must add to be used, and what may be lost where a pose leaves
-/// that landmarks locate, by default [nats per DoF of a pose].
-constexpr double kLittle = 0.1, kLoss = 0.06;
+/// What the newest pose may lose where another leaves that landmarks locate, as a part of what the
+/// map may: it loses at every pose.
+constexpr double kOfNewest = 0.1;
+/// So many of the nearest poses are tested for being near a temporary one.
+constexpr std::size_t kMostCovers = 4;
 
 [[noreturn]] void refuse(const std::string& message) { throw Error(ErrorCode::input, message); }
-
-/// (I + 1)^power − 1 of the gain I of a measurement of n numbers as good as what is known of them,
-/// such as odometry between two poses, which is n/2 ln 2: what the thresholds of section 5.2 come
-/// to for such data.
-double default_gain(int n, double power) {
-  return std::pow(0.5 * n * std::log(2.0) + 1.0, power) - 1.0;
-}
 
 /// Σ̄_y as the options give it; empty: not given.
 Matrix sensor_covariance(const std::vector<double>& numbers, const RigidGroup& group) {
@@ -69,9 +53,9 @@ CompactPose::CompactPose(std::unique_ptr<Estimator> estimator, CompactPoseOption
                          std::unique_ptr<PoseRemover> remover)
     : options_(std::move(options)),
       remover_(std::move(remover)),
-      range_(options_.sensor_range()),
       graph_(std::move(estimator), options_.composition,
-             options_.search == Search::recorded ? KeptMarginals::none : KeptMarginals::diagonal) {
+             options_.search == Search::recorded ? KeptMarginals::none : KeptMarginals::diagonal),
+      loops_(options_) {
   if (options_.keep == 1) {
     throw Error(ErrorCode::usage,
                 "compact_pose: keep=1: the first pose and the newest one stay in any case; "
@@ -85,34 +69,8 @@ CompactPose::CompactPose(std::unique_ptr<Estimator> estimator, CompactPoseOption
   }
 }
 
-void CompactPose::start(const Variable& pose) {
-  if (options_.search == Search::recorded && !recorded_) {
-    throw Error(ErrorCode::usage,
-                "compact_pose: search=recorded is for a recording, whose measurements are known "
-                "before: give search=index");
-  }
-  // Before anything has changed: what the options say fits this type of pose.
-  const Matrix sensor = sensor_covariance(options_.sensor, RigidGroup(pose.type));
-  graph_.start(pose, report_.seconds);
-  sensor_ = sensor;
-  const RigidGroup& group = graph_.group();
-  const int n = group.tangent_size();
-  test_.emplace(group, range_);
-  radius_ = options_.search == Search::index ? range_.radius(group.dimension()) : kInfinity;
-  check_.emplace(group, range_, options_.gate, options_.trust);
-  const auto threshold = [&](bool everything, double chosen, double power) {
-    if (everything) return -kInfinity;
-    return chosen < 0.0 ? default_gain(n, power) : chosen;
-  };
-  loop_gain_ = threshold(options_.strategy == Strategy::apal, options_.loop_gain, 1.36);
-  pose_gain_ = threshold(options_.strategy != Strategy::fpfl, options_.pose_gain, 1.7);
-  prior_gain_ = loop_gain_;
-  if (options_.prior_gain >= 0.0 && options_.strategy != Strategy::apal)
-    prior_gain_ = options_.prior_gain;
-  landmark_gain_ = options_.strategy == Strategy::apal ? -kInfinity
-                   : options_.landmark_gain >= 0.0     ? options_.landmark_gain
-                                                       : kLittle * n;
-  landmark_loss_ = options_.landmark_loss >= 0.0 ? options_.landmark_loss : kLoss * n;
+void CompactPose::expect(const Graph& recording, std::span<const Arrival> poses) {
+  loops_.expect(recording, poses);
 }
 
 void CompactPose::load(const Graph& map) {
@@ -128,43 +86,52 @@ std::vector<Id> CompactPose::unlocated() const {
   return poses;
 }
 
+void CompactPose::start(const Variable& pose) {
+  // Before anything has changed: what the options say fits this type of pose.
+  loops_.search().check_recording();
+  Matrix sensor = sensor_covariance(options_.sensor, RigidGroup(pose.type));
+  graph_.start(pose, report_.seconds);
+  gains_ = options_.gains(graph_.group().tangent_size());
+  loops_.begin(graph_.group(), gains_, std::move(sensor));
+  absolute_ = {gains_.prior, {options_.gate}};
+  landmarks_ = {options_, gains_.landmark};
+}
+
 void CompactPose::add_pose(const Variable& pose, std::span<const Factor> odometry) {
   if (open_) throw Error(ErrorCode::usage, "add_pose before the pose before it was ended");
-  PoseReport report;
-  report.id = pose.id;
   if (graph_.empty()) {
     if (!odometry.empty())
       refuse(fmt::format("pose {} is the first, and moved from another", id_text(pose.id)));
     if (graph_.size() > 0) check_new(pose);
-    std::swap(report_, report);
+    report_ = {};
+    report_.id = pose.id;
     start(pose);
   } else {
-    check_new(pose);
-    if (pose.id == graph_.newest_id())
-      refuse(fmt::format("pose {} is there already", id_text(pose.id)));
-    if (pose.fixed && !graph_.located()) {
-      refuse(fmt::format("pose {} is held, while it is unknown where the trajectory is on the map",
-                         pose.id));
-    }
-    if (odometry.empty())
-      refuse(fmt::format("pose {} comes without odometry from pose {}", id_text(pose.id),
-                         id_text(graph_.newest_id())));
-    const Motion motion = graph_.fuse(odometry, graph_.newest_id(), pose.id);
-    std::swap(report_, report);
-    const Timed timed(report_.seconds.total);
-    odometry_ = to_matrix(motion.covariance, graph_.group().tangent_size());
-    driven_ += graph_.group().place(graph_.group().state(motion.mean)).at.t.norm();
-    follow_refused(motion);
-    graph_.advance(pose, motion, odometry.front().type);
-    if (pose.fixed) graph_.keep(report_.seconds);
+    advance(pose, odometry);
   }
   open_ = true;
-  searched_ = false;
-  answered_ = in_vain_ = 0;
-  proposed_ = -1;
-  candidates_.clear();
-  dimensions_.clear();
-  seen_.clear();
+  loops_.begin_pose();
+  landmarks_.begin_pose();
+}
+
+void CompactPose::advance(const Variable& pose, std::span<const Factor> odometry) {
+  check_new(pose);
+  if (pose.id == graph_.newest_id())
+    refuse(fmt::format("pose {} is there already", id_text(pose.id)));
+  if (pose.fixed && !graph_.located()) {
+    refuse(fmt::format("pose {} is held, while it is unknown where the trajectory is on the map",
+                       pose.id));
+  }
+  if (odometry.empty())
+    refuse(fmt::format("pose {} comes without odometry from pose {}", id_text(pose.id),
+                       id_text(graph_.newest_id())));
+  const Motion motion = graph_.fuse(odometry, graph_.newest_id(), pose.id);
+  report_ = {};
+  report_.id = pose.id;
+  const Timed timed(report_.seconds.total);
+  loops_.advance(motion, graph_.group());
+  graph_.advance(pose, motion, odometry.front().type);
+  if (pose.fixed) graph_.keep(report_.seconds);
 }
 
 void CompactPose::check_new(const Variable& pose) const {
@@ -173,8 +140,14 @@ void CompactPose::check_new(const Variable& pose) const {
                        pose.type->tag(), graph_.group().motions().type().tag()));
   }
   if (graph_.find(pose.id) >= 0) refuse(fmt::format("pose {} is there already", id_text(pose.id)));
-  if (graph_.landmark(pose.id) || waiting_landmarks_.contains(pose.id))
+  if (graph_.landmark(pose.id) || landmarks_.waiting().type(pose.id))
     refuse(fmt::format("pose {} has the id of a landmark", id_text(pose.id)));
+}
+
+std::optional<MatchProposal> CompactPose::next_match() {
+  if (!open_) throw Error(ErrorCode::usage, "next_match without a pose");
+  const Timed timed(report_.seconds.total);
+  return loops_.next_match(graph_, report_);
 }
 
 LinkReport CompactPose::offer(Id other, std::span<const Factor> measured) {
@@ -189,196 +162,30 @@ LinkReport CompactPose::offer(Id other, std::span<const Factor> measured) {
     refuse(fmt::format("a link from pose {} to itself", id_text(other)));
   const Motion motion =
       measured.empty() ? Motion() : graph_.fuse(measured, other, graph_.newest_id());
-  if (!searched_) search();
-  LinkReport report{.earlier = other, .later = graph_.newest_id()};
-  const std::optional<Candidate> candidate = take_candidate(pose);
-  if (candidate) report.expected_gain = candidate->gain;
-  record_.note(pose, !measured.empty());
-  ++answered_;
-  if (!measured.empty()) {
-    Link link{.earlier = pose,
-              .later = graph_.newest_kept() ? graph_.size() - 1 : graph_.size(),
-              .factors = {measured.begin(), measured.end()},
-              .motion = motion,
-              .mean = graph_.group().state(motion.mean),
-              .covariance = to_matrix(motion.covariance, graph_.group().tangent_size())};
-    typical_.note(link.covariance);
-    report.verdict = judge(link, report);
-    const bool waits = report.verdict == LinkVerdict::waiting;
-    if (report.verdict == LinkVerdict::linked) in_vain_ = 0;
-    if (pose == proposed_ && (report.verdict == LinkVerdict::inconsistent || waits)) ++in_vain_;
-    if (report.verdict == LinkVerdict::linked || waits) graph_.make_permanent(pose);
-    if (report.verdict == LinkVerdict::linked) {
-      const bool noted = candidate && watches();
-      if (noted) finder_.note_loop(dimensions_[candidate->place], report.gain, link.covariance);
-      learnt_.push_back({other, graph_.newest_id(), link.covariance, report.gain, noted});
-      use(link);
-    } else if (waits) {
-      if (!graph_.newest_kept()) graph_.keep(report_.seconds);
-      learnt_.push_back({other, graph_.newest_id(), link.covariance, report.gain, false});
-      driven_ = kInfinity;  // what agrees with it may be seen from the next pose
-      waiting_.push_back({std::move(link), report});
-      if (waiting_.size() > kMostWaiting) {  // nothing has agreed with it for so long
-        waiting_.front().report.verdict = LinkVerdict::inconsistent;
-        report_.links.push_back(waiting_.front().report);
-        waiting_.erase(waiting_.begin());
-      }
-    }
-  }
-  if (learnt_.size() > Ways::kMost) learnt_.pop_front();
-  report_.links.push_back(report);
-  if (report.verdict == LinkVerdict::linked) judge_waiting();
-  return report;
+  return loops_.judge(pose, measured, motion, graph_, report_);
 }
 
-/// Lines 22 and 23 of Algorithm 1, and whether the link fits.
-LinkVerdict CompactPose::judge(const Link& link, LinkReport& report) {
-  if (!graph_.connected(link.earlier, link.later)) {  // nothing is known that it could contradict
-    report.gain = kInfinity;
-    return check_->on() && !agrees_with_waiting(link) ? LinkVerdict::waiting : LinkVerdict::linked;
-  }
-  const Displacement d = known_displacement(link.earlier);
-  report.gain = mutual_information(link.covariance, d.covariance);
-  const Fit fit = check_->fit(link, d);
-  report.innovation = fit.innovation;
-  if (!(report.gain > loop_gain_)) return LinkVerdict::uninformative;
-  if (!fit.consistent)
-    return doubts_odometry(link, d) ? LinkVerdict::linked : LinkVerdict::inconsistent;
-  if (check_->needs_another(fit) && !agrees_with_waiting(link)) return LinkVerdict::waiting;
-  return LinkVerdict::linked;
+PriorReport CompactPose::offer_prior(const Factor& measured) {
+  if (!open_) throw Error(ErrorCode::usage, "offer_prior without a pose");
+  const Timed timed(report_.seconds.total);
+  return absolute_.judge(measured, graph_, report_);
 }
 
-void CompactPose::follow_refused(const Motion& motion) {
-  const RigidGroup& group = graph_.group();
-  const State step = group.state(motion.mean);
-  const Matrix A = group.adjoint(group.inverse(step));
-  for (Refused& refused : refused_) {
-    refused.since.mean = group.compose(refused.since.mean, step);
-    refused.since.covariance = A * refused.since.covariance * A.transpose() + odometry_;
-  }
+void CompactPose::offer_landmark(const LandmarkObservation& observation) {
+  if (!open_) throw Error(ErrorCode::usage, "offer_landmark without a pose");
+  landmarks_.offer(observation, graph_);
 }
 
-/// Of a link that the gate refuses. Where three of other poses that it has refused before agree
-/// with it, each closing a cycle with the odometry between their ends, it is the estimate that is
-/// wrong: odometry is less certain than its covariances say, as where a wheel's radius is. False
-/// matches that agree so with each other are one place that looks like another.
-bool CompactPose::doubts_odometry(const Link& link, const Displacement& expected) {
-  const Id earlier = graph_.id(link.earlier);
-  std::set<Id> agree;
-  for (const Refused& other : refused_) {
-    const int pose = graph_.find(other.earlier);
-    if (pose < 0 || other.later == graph_.newest_id()) continue;
-    const Fit fit =
-        check_->agreement(other.link, link, graph_.between(pose, link.earlier), other.since);
-    if (fit.consistent && !check_->needs_another(fit)) agree.insert(other.later);
-  }
-  if (agree.size() < kAgreeing || !check_->on()) {
-    Refused refused{earlier, graph_.newest_id(), link, expected};
-    refused.since.mean = graph_.group().between(link.mean, link.mean);
-    refused.since.covariance.setZero();
-    refused_.push_back(std::move(refused));
-    if (refused_.size() > kMostRefused) refused_.pop_front();
-    return false;
-  }
-  const double loose = check_->loosen_for(link, expected);
-  if (!check_->fit(link, expected).consistent) return false;
-  report_.notes.push_back(fmt::format(
-      "matches of {} poses that the gate refused agree with that of poses {} and {}: odometry is "
-      "less "
-      "certain than its covariances say, and the gate takes standard deviations as {:.3g} times "
-      "larger from now on",
-      agree.size(), earlier, graph_.newest_id(), std::sqrt(loose)));
-  refused_.clear();
+bool CompactPose::revoke(Id a, Id b) {
+  const bool was_there = graph_.revoke(a, b, report_.seconds);
+  if (!loops_.forget(a, b, was_there, graph_)) return false;
+  if (!open_) return true;
+  loops_.restart(report_);  // others tell more without it
+  report_.closed_loop = std::ranges::any_of(report_.links, [&](const LinkReport& link) {
+    return link.verdict == LinkVerdict::linked &&
+           std::minmax(link.earlier, link.later) != std::minmax(a, b);
+  });
   return true;
-}
-
-bool CompactPose::agrees_with_waiting(const Link& link) {
-  for (std::size_t k = 0; k < waiting_.size(); ++k) {
-    const Link& other = waiting_[k].link;
-    const bool kept = link.later < graph_.size();
-    if (other.earlier == link.earlier && other.later == link.later) continue;
-    if (!graph_.connected(other.earlier, link.earlier)) continue;
-    // Before it is kept, the newest pose is known by its displacement only.
-    const Displacement later =
-        kept ? graph_.between(other.later, link.later) : known_displacement(other.later);
-    const Fit fit =
-        check_->agreement(other, link, graph_.between(other.earlier, link.earlier), later);
-    if (!fit.consistent || check_->needs_another(fit)) continue;
-    return true;
-  }
-  return false;
-}
-
-/// Relocating divides the measurement between two ways. That must leave little between the two
-/// poses that is worth a pose of its own, measured by what a match is worth here, whatever the
-/// options expect; and must cost little of what is known of the way that ends here: where loop
-/// closures are not better than odometry, the loss would add up. The more poses are kept nearby,
-/// the less each way matters, and the more is gained by not keeping another.
-std::optional<double> CompactPose::relocation(const Link& link) const {
-  // Where another pose would have to leave, information is lost in any case.
-  if (!options_.reuse && !graph_.full()) return std::nullopt;
-  if (!(pose_gain_ > 0.0)) return std::nullopt;  // every pose is to be kept
-  const double n = graph_.group().tangent_size();
-  const double of_way = part_of_way(graph_.newest_odometry(), link.covariance);
-  const Matrix rest = link.covariance / (1.0 - of_way);
-  // Three matches in one are as good as any; a lower g_pose must not keep poses of one place for
-  // ever.
-  const double enough = std::max(pose_gain_, 0.5 * n * std::log(4.0));
-  if (!(mutual_information(typical_.covariance(), rest) < enough)) return std::nullopt;
-  // Where the bridge is not informative, nothing is divided.
-  if (graph_.full()) return of_way;
-  const Matrix end = graph_.newest_odometry() + link.covariance;
-  const double lost = mutual_information(end, link.covariance);
-  if (lost > options_.reuse_loss * report_.candidates * n) return std::nullopt;
-  return of_way;
-}
-
-void CompactPose::use(const Link& link) {
-  if (!graph_.connected(link.earlier, link.later)) {
-    graph_.locate(link.earlier, link.mean, link.factors, report_.seconds);
-    // The poses of the map are candidates from now on.
-    searched_ = false;
-    candidates_.clear();
-    dimensions_.clear();
-    report_.candidates = 0;
-    report_.least_gain = kInfinity;
-    report_.closed_loop = true;
-    return;
-  }
-  const bool of_newest = link.later == graph_.size() && !graph_.newest_kept();
-  const std::optional<double> of_way = of_newest ? relocation(link) : std::nullopt;
-  if (of_way) {
-    graph_.relocate(link.earlier, link.motion, *of_way, loop_gain_, report_.seconds);
-  } else {
-    graph_.link(link.factors, report_.seconds);
-  }
-  report_.closed_loop = true;
-}
-
-/// After a link was used, what waits is looked at again: it fits closely now, or not at all.
-void CompactPose::judge_waiting() {
-  for (bool again = true; std::exchange(again, false);) {
-    for (std::size_t k = 0; k < waiting_.size() && !again; ++k) {
-      Waiting& old = waiting_[k];
-      if (!graph_.connected(old.link.earlier, old.link.later)) continue;
-      const Displacement d = graph_.between(old.link.earlier, old.link.later);
-      const Fit fit = check_->fit(old.link, d);
-      old.report.innovation = fit.innovation;
-      old.report.gain = mutual_information(old.link.covariance, d.covariance);
-      if (fit.consistent && check_->needs_another(fit)) continue;
-      if (!fit.consistent) {
-        old.report.verdict = LinkVerdict::inconsistent;
-      } else if (!(old.report.gain > loop_gain_)) {
-        old.report.verdict = LinkVerdict::uninformative;
-      } else {
-        old.report.verdict = LinkVerdict::linked;
-        use(old.link);
-      }
-      report_.links.push_back(old.report);
-      waiting_.erase(waiting_.begin() + static_cast<std::ptrdiff_t>(k));
-      again = true;
-    }
-  }
 }
 
 /// Line 32 of Algorithm 1.
@@ -386,30 +193,80 @@ PoseReport CompactPose::end_pose() {
   if (!open_) throw Error(ErrorCode::usage, "end_pose without a pose");
   {
     const Timed timed(report_.seconds.total);
-    if (!searched_) search();
-    if (silenced()) typical_.note_silence();
+    loops_.end_pose(graph_, report_);
     removed_.clear();
-    settle_priors();
-    settle_left_out();  // by links of the pose, or its odometry
-    const bool kept = graph_.newest_kept();
-    use_landmarks();
-    const bool triangulated = use_waiting_landmarks();
-    const bool by_landmarks = !kept && graph_.newest_kept();
-    if (!graph_.newest_kept() && !report_.closed_loop && report_.least_gain > pose_gain_)
-      graph_.keep(report_.seconds);
-    if (!add_landmarks() && !triangulated && !kept && graph_.newest_kept() && pose_gain_ > 0.0 &&
-        !graph_.landmarks().empty())
-      limit_poses_of_landmarks(by_landmarks);
-    if (graph_.predecessor() >= 0 && report_.candidates > 0 && watches())
-      finder_.note_pose(report_.least_gain);
-    for (const Candidate& left : candidates_)
-      report_.most_gain = std::max(report_.most_gain, left.gain);
+    absolute_.settle(graph_, report_);
+    landmarks_.settle_left_out(graph_, report_);  // by links of the pose, or its odometry
+    settle_pose();
     make_room();
-    settle_left_out();
+    landmarks_.settle_left_out(graph_, report_);
   }
   open_ = false;
   report_.kept = graph_.newest_kept();
   return report_;
+}
+
+/// What is left to be used, and whether the pose is kept.
+void CompactPose::settle_pose() {
+  const bool kept = graph_.newest_kept();
+  landmarks_.use_known(graph_, report_);
+  const bool triangulated = landmarks_.use_waiting(graph_, report_);
+  const bool by_landmarks = !kept && graph_.newest_kept();
+  if (!graph_.newest_kept() && !report_.closed_loop && report_.least_gain > gains_.pose)
+    graph_.keep(report_.seconds);
+  const bool added = landmarks_.add_new(graph_, report_);
+  if (!added && !triangulated && !kept && graph_.newest_kept() && gains_.pose > 0.0 &&
+      !graph_.landmarks().empty())
+    limit_poses_of_landmarks(by_landmarks);
+}
+
+/// A pose that stays, within the sensor's range of another: the nearest.
+std::optional<Id> CompactPose::cover(int pose) {
+  const DistanceTest& test = loops_.search().test();
+  std::vector<std::pair<double, int>> near;
+  const PlacedState there = graph_.group().place(graph_.state(pose));
+  for (int other = 0; other < graph_.size(); ++other) {
+    if (other == pose || graph_.temporary(other)) continue;
+    const Pose apart = RigidGroup::seen_from(graph_.group().place(graph_.state(other)), there);
+    if (test.possible(apart)) near.emplace_back(apart.t.norm(), other);
+  }
+  std::ranges::sort(near);
+  if (near.size() > kMostCovers) near.resize(kMostCovers);
+  for (const auto& [distance, other] : near) {
+    if (test.passes(test.dimensions(graph_.between(other, pose)))) return graph_.id(other);
+  }
+  return std::nullopt;
+}
+
+/// The newest pose is kept, without a link or anything else that must stay.
+void CompactPose::limit_poses_of_landmarks(bool located) {
+  graph_.make_temporary();
+  if (!located) return;
+  const InformationLoss most{.map = gains_.landmark_loss,
+                             .newest = kOfNewest * gains_.landmark_loss};
+  const auto covering = [&](int pose) { return cover(pose); };
+  const auto needed = [&](Id pose) { return landmarks_.waiting().has_views_from(pose); };
+  while (auto leaving = graph_.drop_temporary(most, covering, needed, report_.seconds))
+    note_leaving(*leaving);
+}
+
+/// Poses have new numbers.
+void CompactPose::note_leaving(const CompactGraph::Leaving& leaving) {
+  removed_.insert(removed_.end(), leaving.poses.begin(), leaving.poses.end());
+  report_.removed = static_cast<int>(std::ssize(removed_));
+  landmarks_.forget(leaving.poses, report_);
+  loops_.renumber(leaving.now);
+}
+
+void CompactPose::make_room() {
+  if (!remover_ || graph_.size() <= options_.keep) return;
+  std::vector<int> held = loops_.held();
+  std::ranges::copy(absolute_.held(graph_), std::back_inserter(held));
+  CompactGraph::Leaving leaving = graph_.make_room(*remover_, options_.keep, held, report_.seconds);
+  if (leaving.note != noted_ && !leaving.note.empty()) report_.notes.push_back(leaving.note);
+  noted_ = std::move(leaving.note);
+  report_.notes.insert(report_.notes.end(), leaving.notes.begin(), leaving.notes.end());
+  if (!leaving.poses.empty()) note_leaving(leaving);
 }
 
 bool CompactPose::finish() {
@@ -419,7 +276,7 @@ bool CompactPose::finish() {
   if (!graph_.newest_kept()) graph_.keep(report_.seconds);
   make_room();
   const bool converged = graph_.solve_fully();
-  if (watches()) noise_scale_ = noise_scale(estimator().graph(), estimator().chi2());
+  if (loops_.watches()) noise_scale_ = noise_scale(estimator().graph(), estimator().chi2());
   return converged;
 }
 
@@ -439,10 +296,11 @@ OptionValues CompactPose::watching(bool recorded_only) const {
 }
 
 OptionValues CompactPose::found() const {
-  static_cast<void>(finder_.sensor());  // throws where there is no loop closure, perhaps no pose
-  SensorRange range = range_;
+  // Throws where there is no loop closure, perhaps no pose.
+  static_cast<void>(loops_.thresholds().sensor());
+  SensorRange range = options_.sensor_range();
   range.noise_scale = noise_scale_;
-  return finder_.found(DistanceTest(graph_.group(), range));
+  return loops_.thresholds().found(DistanceTest(graph_.group(), range));
 }
 
 OptionValues CompactPose::scaled(const OptionValues& found, double links, double poses) const {
@@ -457,7 +315,8 @@ OptionValues CompactPose::scaled(const OptionValues& found, double links, double
 }
 
 double CompactPose::accuracy() const {
-  return std::sqrt(graph_.group().twist_covariance(finder_.sensor()).topLeftCorner<3, 3>().trace());
+  return std::sqrt(
+      graph_.group().twist_covariance(loops_.thresholds().sensor()).topLeftCorner<3, 3>().trace());
 }
 
 }  // namespace cairn::compact

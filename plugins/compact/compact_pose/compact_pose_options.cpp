@@ -2,6 +2,8 @@
 #include "compact_pose_options.hpp"
 
 #include <charconv>
+#include <cmath>
+#include <limits>
 #include <sstream>
 
 #include "cairn/runtime/error.hpp"
@@ -10,6 +12,17 @@
 
 namespace cairn::compact {
 namespace {
+
+/// What a measurement of a landmark must add to be used, and what may be lost where a pose leaves
+/// that landmarks locate, by default [nats per DoF of a pose].
+constexpr double kLittle = 0.1, kLoss = 0.06;
+
+/// (I + 1)^power − 1 of the gain I of a measurement of n numbers as good as what is known of them,
+/// such as odometry between two poses, which is n/2 ln 2: what the thresholds of section 5.2 come
+/// to for such data.
+double default_gain(int n, double power) {
+  return std::pow(0.5 * n * std::log(2.0) + 1.0, power) - 1.0;
+}
 
 std::vector<double> numbers(const std::string& text) {
   std::istringstream words(text);
@@ -62,6 +75,23 @@ OptionFields<O> range_fields() {
 }
 
 }  // namespace
+
+Gains CompactPoseOptions::gains(int dof) const {
+  const auto threshold = [&](bool everything, double chosen, double power) {
+    if (everything) return -std::numeric_limits<double>::infinity();
+    return chosen < 0.0 ? default_gain(dof, power) : chosen;
+  };
+  const bool all = strategy == Strategy::apal;
+  Gains gains;
+  gains.loop = threshold(all, loop_gain, 1.36);
+  gains.pose = threshold(strategy != Strategy::fpfl, pose_gain, 1.7);
+  gains.prior = prior_gain >= 0.0 && !all ? prior_gain : gains.loop;
+  gains.landmark = all                    ? -std::numeric_limits<double>::infinity()
+                   : landmark_gain >= 0.0 ? landmark_gain
+                                          : kLittle * dof;
+  gains.landmark_loss = landmark_loss >= 0.0 ? landmark_loss : kLoss * dof;
+  return gains;
+}
 
 OptionFields<CompactPoseOptions> CompactPoseOptions::fields() {
   return range_fields()

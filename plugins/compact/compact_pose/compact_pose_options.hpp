@@ -43,6 +43,13 @@ constexpr auto enum_names(Search) {
                                           {Search::recorded, "recorded"}});
 }
 
+/// Information gains that decide what is used and kept [nats].
+struct Gains {
+  double loop = 0.0, pose = 0.0;  ///< g_loop, g_pose
+  double prior = 0.0, landmark = 0.0;
+  double landmark_loss = 0.0;  ///< of the map, where a pose leaves that landmarks locate
+};
+
 /// Options of the pose policy `compact_pose`.
 struct CompactPoseOptions {
   Strategy strategy = Strategy::fpfl;
@@ -98,6 +105,9 @@ struct CompactPoseOptions {
         .test = rotation,
         .view_axis = static_cast<int>(view_axis)};
   }
+
+  /// For poses with so many degrees of freedom. −∞ where everything is used, or kept.
+  Gains gains(int dof) const;
 
   static OptionFields<CompactPoseOptions> fields();
 };

@@ -10,12 +10,18 @@
 
 namespace cairn::compact {
 
-ConsistencyCheck::ConsistencyCheck(const RigidGroup& group, const SensorRange& range, double gate,
+bool Gate::passes(double innovation, int dof) const {
+  if (!std::isfinite(innovation)) return false;
+  if (!on() || dof == 0) return true;
+  return innovation < boost::math::quantile(boost::math::chi_squared(dof), part);
+}
+
+ConsistencyCheck::ConsistencyCheck(const RigidGroup& group, const SensorRange& range, Gate gate,
                                    double trust)
-    : group_(group), gate_(gate), trust_(trust) {
-  if (gate <= 0.0) return;
+    : group_(group), trust_(trust) {
+  if (!gate.on()) return;
   const int n = group.tangent_size();
-  limit_ = boost::math::quantile(boost::math::chi_squared(n), gate);
+  limit_ = boost::math::quantile(boost::math::chi_squared(n), gate.part);
   // Of an ellipsoid {e : eᵀ S⁻¹ e < q}: π^{n/2} / Γ(n/2 + 1) · q^{n/2} |S|^{½}.
   log_volume_ = 0.5 * n * std::log(std::numbers::pi * limit_) - std::lgamma(0.5 * n + 1.0);
   for (int r = 0; r < group.dimension(); ++r) log_volume_ -= std::log(2.0 * range.translation[r]);
@@ -46,12 +52,6 @@ double ConsistencyCheck::loosen_for(const Link& link, const Displacement& expect
   while (loose_ < kMost && !fit(link, expected).consistent) loose_ *= 2.0;
   if (!fit(link, expected).consistent) loose_ = before;
   return loose_;
-}
-
-bool ConsistencyCheck::passes(double innovation, int dof) const {
-  if (!std::isfinite(innovation)) return false;
-  if (!on() || dof == 0) return true;
-  return innovation < boost::math::quantile(boost::math::chi_squared(dof), gate_);
 }
 
 /// With u = x_i⁻¹x_k and w = x_n⁻¹x_m between the ends of the links (i, n) and (k, m), the cycle

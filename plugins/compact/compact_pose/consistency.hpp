@@ -26,6 +26,16 @@ struct Fit {
   bool consistent = true;
 };
 
+/// The part of the right measurements that pass a test of their innovation; 0: there is no test.
+struct Gate {
+  double part = 0.0;
+
+  bool on() const { return part > 0.0; }
+  /// Whether an innovation is below the bound for so many degrees of freedom; if there is no test,
+  /// whether it is finite.
+  bool passes(double innovation, int dof) const;
+};
+
 /// Distinguishes false loop closures from correct ones. A false match contradicts the estimate, so
 /// its apparent information gain is high; it is detected by its inconsistency.
 ///
@@ -38,9 +48,9 @@ struct Fit {
 /// covariance.
 class ConsistencyCheck {
  public:
-  /// `gate`: part of the right links that pass; 0 turns the check off. `trust`: a link needs
-  /// another one's agreement if a false match would fit with more than this probability.
-  ConsistencyCheck(const RigidGroup& group, const SensorRange& range, double gate, double trust);
+  /// `trust`: a link needs another one's agreement if a false match would fit with more than this
+  /// probability.
+  ConsistencyCheck(const RigidGroup& group, const SensorRange& range, Gate gate, double trust);
 
   bool on() const { return limit_ > 0.0; }
   /// Takes the displacements that are expected as less certain from now on, Σ_d times the least
@@ -52,9 +62,6 @@ class ConsistencyCheck {
   /// to the second's, `later` likewise.
   Fit agreement(const Link& first, const Link& second, const Displacement& earlier,
                 const Displacement& later) const;
-  /// Whether an absolute measurement's innovation is below the bound for so many degrees of
-  /// freedom; if the check is off, whether it is finite.
-  bool passes(double innovation, int dof) const;
   bool needs_another(const Fit& fit) const { return on() && fit.chance > trust_; }
 
  private:
@@ -63,7 +70,7 @@ class ConsistencyCheck {
   const RigidGroup& group_;
   double limit_ = 0.0;       ///< χ² quantile of the gate
   double log_volume_ = 0.0;  ///< ln of the ellipsoid's volume for S = I over the range's
-  double gate_, trust_;
+  double trust_;
   double loose_ = 1.0;  ///< times Σ_d
 };
 

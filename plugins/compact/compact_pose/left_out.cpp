@@ -14,9 +14,9 @@
 #include "compact_graph.hpp"
 #include "dense/cholesky.hpp"
 #include "dense/eigenvalues.hpp"
-#include "landmarks.hpp"
 #include "linearity.hpp"
 #include "measured.hpp"
+#include "observations.hpp"
 
 namespace cairn::compact {
 namespace {

@@ -6,8 +6,8 @@
 #include <Eigen/Core>
 
 #include "cairn/types/variable_type.hpp"
-#include "landmarks.hpp"
 #include "measured.hpp"
+#include "observations.hpp"
 #include "rigid_group.hpp"
 
 namespace cairn::compact {

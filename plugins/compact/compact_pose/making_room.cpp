@@ -10,7 +10,6 @@
 
 #include "cairn/runtime/timed.hpp"
 #include "compact_graph.hpp"
-#include "compact_pose.hpp"
 
 namespace cairn::compact {
 namespace {
@@ -30,32 +29,6 @@ void append(OdometryChain&& next, OdometryChain& chain) {
 }
 
 }  // namespace
-
-/// Poses have new numbers.
-void CompactPose::note_leaving(const CompactGraph::Leaving& leaving) {
-  removed_.insert(removed_.end(), leaving.poses.begin(), leaving.poses.end());
-  report_.removed = static_cast<int>(std::ssize(removed_));
-  record_.renumber(leaving.now);
-  forget_views(leaving.poses);
-  for (Waiting& waiting : waiting_) {
-    waiting.link.earlier = leaving.now[waiting.link.earlier];
-    waiting.link.later = leaving.now[waiting.link.later];
-  }
-}
-
-void CompactPose::make_room() {
-  if (!remover_ || graph_.size() <= options_.keep) return;
-  std::vector<int> held;
-  for (const Waiting& waiting : waiting_)
-    held.insert(held.end(), {waiting.link.earlier, waiting.link.later});
-  for (const WaitingPrior& waiting : waiting_priors_)
-    held.push_back(graph_.find(waiting.measurement.pose()));
-  CompactGraph::Leaving leaving = graph_.make_room(*remover_, options_.keep, held, report_.seconds);
-  if (leaving.note != noted_ && !leaving.note.empty()) report_.notes.push_back(leaving.note);
-  noted_ = std::move(leaving.note);
-  report_.notes.insert(report_.notes.end(), leaving.notes.begin(), leaving.notes.end());
-  if (!leaving.poses.empty()) note_leaving(leaving);
-}
 
 CompactGraph::Leaving CompactGraph::make_room(PoseRemover& remover, int limit,
                                               std::span<const int> held, PolicySeconds& seconds) {

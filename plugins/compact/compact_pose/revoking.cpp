@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // A compact graph as it would be without a link that it has.
 #include <algorithm>
-#include <limits>
 #include <span>
 #include <string>
 #include <unordered_map>
@@ -13,7 +12,6 @@
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/timed.hpp"
 #include "compact_graph.hpp"
-#include "compact_pose.hpp"
 #include "relocation.hpp"
 
 namespace cairn::compact {
@@ -255,39 +253,6 @@ void CompactGraph::replace_chains(const Ways::Change& change) {
                 chains_.begin() + static_cast<std::ptrdiff_t>(end));
   chains_.insert(chains_.begin() + static_cast<std::ptrdiff_t>(first),
                  std::make_move_iterator(now.begin()), std::make_move_iterator(now.end()));
-}
-
-bool CompactPose::revoke(Id a, Id b) {
-  const auto is_it = [&](const auto& link) {
-    return pair_of(link.earlier, link.later) == pair_of(a, b);
-  };
-  const auto waits = [&](const Waiting& waiting) { return is_it(waiting.report); };
-  const bool was_there = graph_.revoke(a, b, report_.seconds);
-  if (std::erase_if(waiting_, waits) == 0 && !was_there) return false;
-  forget(a, b);
-  if (!open_) return true;
-  // Others tell more without it, so what is known of the candidates is no bound any more.
-  searched_ = false;
-  in_vain_ = 0;
-  candidates_.clear();
-  dimensions_.clear();
-  report_.candidates = 0;
-  report_.least_gain = std::numeric_limits<double>::infinity();
-  report_.closed_loop = std::ranges::any_of(report_.links, [&](const LinkReport& link) {
-    return link.verdict == LinkVerdict::linked && !is_it(link);
-  });
-  return true;
-}
-
-/// What was learnt from the links of two poses.
-void CompactPose::forget(Id a, Id b) {
-  std::erase_if(learnt_, [&](const Learnt& link) {
-    if (pair_of(link.earlier, link.later) != pair_of(a, b)) return false;
-    typical_.forget(link.covariance);
-    if (link.noted) finder_.forget_loop(link.gain, link.covariance);
-    if (const int pose = graph_.find(link.earlier); pose >= 0) record_.revoke(pose);
-    return true;
-  });
 }
 
 }  // namespace cairn::compact

@@ -15,7 +15,6 @@
 #include "cairn/runtime/timed.hpp"
 #include "cairn/types/loss.hpp"
 #include "compact_graph.hpp"
-#include "compact_pose.hpp"
 #include "dense/cholesky.hpp"
 #include "measured.hpp"
 
@@ -29,10 +28,6 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// So many are waited for to make the oldest one's loss small.
 constexpr std::size_t kMostTemporary = 24;
-/// What the newest pose may lose, as a part of what the map may: it loses at every pose.
-constexpr double kOfNewest = 0.1;
-/// So many of the nearest poses are tested for being near a temporary one.
-constexpr std::size_t kMostCovers = 4;
 
 /// A variance that would grow by more than the inverse of this is one of something undetermined.
 constexpr double kDetermined = 1e-9;
@@ -94,8 +89,6 @@ double information_about(const MatrixXd& R, const MatrixXd& S, const MatrixXd& S
   const double loss = 0.5 * (given - all);
   return std::isfinite(loss) ? std::max(0.0, loss) : kInfinity;
 }
-
-// The graph ---------------------------------------------------------------------------------------
 
 bool CompactGraph::temporary(int pose) const {
   return std::ranges::find(temporary_, id(pose), &Temporary::id) != temporary_.end();
@@ -309,36 +302,6 @@ std::optional<CompactGraph::Leaving> CompactGraph::drop_temporary(
     make_permanent(pose);
   }
   return std::nullopt;
-}
-
-// The policy --------------------------------------------------------------------------------------
-
-/// A pose that stays, within the sensor's range of another: the nearest.
-std::optional<Id> CompactPose::cover(int pose) {
-  std::vector<std::pair<double, int>> near;
-  const PlacedState there = graph_.group().place(graph_.state(pose));
-  for (int other = 0; other < graph_.size(); ++other) {
-    if (other == pose || graph_.temporary(other)) continue;
-    const Pose apart = RigidGroup::seen_from(graph_.group().place(graph_.state(other)), there);
-    if (test_->possible(apart)) near.emplace_back(apart.t.norm(), other);
-  }
-  std::ranges::sort(near);
-  if (near.size() > kMostCovers) near.resize(kMostCovers);
-  for (const auto& [distance, other] : near) {
-    if (test_->passes(test_->dimensions(graph_.between(other, pose)))) return graph_.id(other);
-  }
-  return std::nullopt;
-}
-
-/// The newest pose is kept, without a link or anything else that must stay.
-void CompactPose::limit_poses_of_landmarks(bool located) {
-  graph_.make_temporary();
-  if (!located) return;
-  const InformationLoss most{.map = landmark_loss_, .newest = kOfNewest * landmark_loss_};
-  const auto covering = [&](int pose) { return cover(pose); };
-  const auto needed = [&](Id pose) { return has_waiting_views(pose); };
-  while (auto leaving = graph_.drop_temporary(most, covering, needed, report_.seconds))
-    note_leaving(*leaving);
 }
 
 }  // namespace cairn::compact

@@ -11,7 +11,7 @@
 #include "cairn/geometry/pose.hpp"
 #include "dense/cholesky.hpp"
 #include "dense/eigenvalues.hpp"
-#include "landmarks.hpp"
+#include "observations.hpp"
 #include "temporary_poses.hpp"
 
 namespace cairn::compact {

@@ -28,7 +28,7 @@ class ConsistencyIn : public testing::TestWithParam<int> {
   SensorRange range{.translation = {2.0, 3.0, 1.5}, .rotation = kPi};
 
   ConsistencyCheck check(double gate, double trust = 0.01) const {
-    return {group, range, gate, trust};
+    return {group, range, {gate}, trust};
   }
   Displacement displacement(const Pose& mean, const MatrixXd& covariance) const {
     Displacement d = group.displacement(group.place(group.state(world.identity())),

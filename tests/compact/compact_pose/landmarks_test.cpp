@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Landmarks that a robot sees under a policy: which measurements are used, and what the map is
 // then.
-#include "landmarks.hpp"
+#include "observations.hpp"
 
 #include <algorithm>
 #include <array>
