@@ -17,16 +17,16 @@ LinkVerdict AbsoluteSelection::verdict(const MeasuredFit& fit, PriorReport& outc
 
 PriorReport AbsoluteSelection::judge(const Factor& measured, CompactGraph& graph,
                                      PoseReport& report) {
-  AbsoluteMeasurement prior(measured, graph.newest_id(), graph.group().motions().type());
+  AbsoluteMeasurement prior(measured, graph.newest().id(), graph.group().motions().type());
   if (!graph.located()) {
     throw Error(ErrorCode::input,
                 "it is not known where the pose is on the map: absolute measurements are used from "
                 "the first match with it on");
   }
   settle(graph, report);
-  PriorReport outcome{.pose = graph.newest_id()};
+  PriorReport outcome{.pose = graph.newest().id()};
   const bool referenced = graph.referenced();
-  const AbsoluteMeasurement::Linear now = prior.at(graph.newest_state());
+  const AbsoluteMeasurement::Linear now = prior.at(graph.newest().state());
   outcome.verdict = verdict(referenced ? fit(now, graph.newest_covariance(report.seconds))
                                        : frame(graph, report.seconds).fit(now),
                             outcome);
@@ -49,9 +49,9 @@ FrameEstimate AbsoluteSelection::frame(CompactGraph& graph, PolicySeconds& secon
   std::vector<PlacedMeasurement> placed;
   const std::vector<int> poses = held(graph);
   for (std::size_t k = 0; k < waiting_.size(); ++k)
-    placed.push_back({&waiting_[k].measurement, graph.state(poses[k])});
+    placed.push_back({&waiting_[k].measurement, graph.kept().state(poses[k])});
   Eigen::MatrixXd joint = graph.joint_covariance(poses, seconds);
-  return {graph.group(), std::move(placed), graph.newest_state(), std::move(joint)};
+  return {graph.group(), std::move(placed), graph.newest().state(), std::move(joint)};
 }
 
 /// Whether the measurements that wait determine where the graph is: then it is moved there, and has
@@ -74,10 +74,11 @@ bool AbsoluteSelection::find_frame(CompactGraph& graph, PoseReport& report) {
 void AbsoluteSelection::settle(CompactGraph& graph, PoseReport& report) {
   if (!graph.referenced()) return;
   for (Waiting& waiting : std::exchange(waiting_, {})) {
-    const int pose = graph.find(waiting.measurement.pose());
+    const int pose = graph.kept().find(waiting.measurement.pose());
     const Matrix covariance = graph.covariance(pose);
     PriorReport& outcome = waiting.report;
-    outcome.verdict = verdict(fit(waiting.measurement.at(graph.state(pose)), covariance), outcome);
+    outcome.verdict =
+        verdict(fit(waiting.measurement.at(graph.kept().state(pose)), covariance), outcome);
     if (outcome.verdict == LinkVerdict::linked)
       graph.add({&waiting.measurement.factor(), 1}, report.seconds);
     report.priors.push_back(outcome);
@@ -86,7 +87,8 @@ void AbsoluteSelection::settle(CompactGraph& graph, PoseReport& report) {
 
 std::vector<int> AbsoluteSelection::held(const CompactGraph& graph) const {
   std::vector<int> poses;
-  for (const Waiting& waiting : waiting_) poses.push_back(graph.find(waiting.measurement.pose()));
+  for (const Waiting& waiting : waiting_)
+    poses.push_back(graph.kept().find(waiting.measurement.pose()));
   return poses;
 }
 

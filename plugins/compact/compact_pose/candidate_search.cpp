@@ -33,7 +33,7 @@ constexpr auto kByWorth = [](const auto& a, const auto& b) {
 /// Whether the newest pose was matched with this one already, for where it is searched again.
 bool answered(int pose, const CompactGraph& graph, const PoseReport& report) {
   return std::ranges::any_of(report.links, [&](const LinkReport& link) {
-    return link.later == report.id && link.earlier == graph.id(pose);
+    return link.later == report.id && link.earlier == graph.kept().id(pose);
   });
 }
 
@@ -97,10 +97,10 @@ bool CandidateSearch::gives_up() const {
 /// poses. The pose before is among them: the newest depends on all others by its odometry from
 /// there alone, so that no other has a smaller information gain (Σ_in ⪰ Σ of that odometry).
 std::vector<int> CandidateSearch::recorded_pairs(const CompactGraph& graph) const {
-  std::vector<int> poses{graph.predecessor()};
-  if (const auto others = recorded_->find(graph.newest_id()); others != recorded_->end()) {
+  std::vector<int> poses{graph.newest().predecessor};
+  if (const auto others = recorded_->find(graph.newest().id()); others != recorded_->end()) {
     for (const Id other : others->second) {
-      if (const int pose = graph.find(other); pose >= 0) poses.push_back(pose);
+      if (const int pose = graph.kept().find(other); pose >= 0) poses.push_back(pose);
     }
   }
   std::ranges::sort(poses);
@@ -124,9 +124,7 @@ Displacement CandidateSearch::displacement(int pose, CompactGraph& graph, PoseRe
   } else {
     graph.prepare({&pose, 1}, report.seconds);
   }
-  Displacement d = graph.displacement(pose);
-  graph.set_covariance(pose, d);
-  return d;
+  return graph.displacement(pose);
 }
 
 bool CandidateSearch::silenced(CompactGraph& graph, PoseReport& report) {
@@ -149,7 +147,8 @@ std::vector<int> CandidateSearch::possible(CompactGraph& graph, PoseReport& repo
   const std::vector<int> near = recorded ? recorded_pairs(graph) : graph.near(radius_);
   std::vector<int> possible;
   for (const int pose : near) {
-    if (options_.search == Search::index && !test_->possible(graph.newest_seen_from(pose)))
+    if (options_.search == Search::index &&
+        !test_->possible(RigidGroup::seen_from(graph.kept().placed(pose), graph.newest().placed)))
       continue;
     possible.push_back(pose);
   }
@@ -173,7 +172,7 @@ void CandidateSearch::add(int pose, double gain, const Dimensions& dimensions,
 
 void CandidateSearch::search(CompactGraph& graph, const MatchStatistics& matches,
                              PoseReport& report) {
-  if (std::exchange(newest_.searched, true) || graph.predecessor() < 0) return;
+  if (std::exchange(newest_.searched, true) || graph.newest().predecessor < 0) return;
   const Timed timed(report.seconds.search);
   const double solving = report.seconds.covariances;
   const std::vector<int> poses = possible(graph, report);
@@ -181,14 +180,13 @@ void CandidateSearch::search(CompactGraph& graph, const MatchStatistics& matches
   const TypicalMatch& typical = matches.typical();
   expected_ = sensor_.size() > 0 ? sensor_ : typical.known() ? typical.covariance() : odometry_;
   for (const int pose : poses) {
-    Displacement d = graph.displacement(pose);
-    graph.set_covariance(pose, d);
+    const Displacement d = graph.displacement(pose);
     const Dimensions dimensions = test_->dimensions(d);
     if (tested() && !test_->passes(dimensions)) continue;
     const double gain = mutual_information(expected_, d.covariance);
     ++report.candidates;
     report.least_gain = std::min(report.least_gain, gain);
-    if (pose != graph.predecessor() && !answered(pose, graph, report))
+    if (pose != graph.newest().predecessor && !answered(pose, graph, report))
       add(pose, gain, dimensions, matches, graph);
   }
   if (looks_wide(graph, report)) search_wide(graph, matches, report);
@@ -226,9 +224,8 @@ void CandidateSearch::search_wide(CompactGraph& graph, const MatchStatistics& ma
   const std::size_t first = newest_.candidates.size();
   std::vector<std::pair<double, Candidate>> found;
   for (const int pose : all) {
-    if (pose == graph.predecessor() || answered(pose, graph, report)) continue;
-    Displacement d = graph.displacement(pose);
-    graph.set_covariance(pose, d);
+    if (pose == graph.newest().predecessor || answered(pose, graph, report)) continue;
+    const Displacement d = graph.displacement(pose);
     const Dimensions dimensions = test_->dimensions(d);
     if (test_->passes(dimensions)) continue;
     const std::optional<double> probability = test_->relative_probability(dimensions);
@@ -262,8 +259,8 @@ std::optional<MatchProposal> CandidateSearch::next(CompactGraph& graph,
       const Displacement d = displacement(best.pose, graph, report);
       const auto mean = graph.group().view(d.mean);
       newest_.proposed = best.pose;
-      return MatchProposal{graph.id(best.pose),
-                           graph.newest_id(),
+      return MatchProposal{graph.kept().id(best.pose),
+                           graph.newest().id(),
                            best.gain,
                            {{mean.begin(), mean.end()},
                             {d.covariance.data(), d.covariance.data() + d.covariance.size()}}};

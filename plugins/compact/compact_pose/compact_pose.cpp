@@ -74,14 +74,14 @@ void CompactPose::expect(const Graph& recording, std::span<const Arrival> poses)
 }
 
 void CompactPose::load(const Graph& map) {
-  if (!graph_.empty() || graph_.size() > 0)
+  if (!graph_.empty() || graph_.kept().size() > 0)
     throw Error(ErrorCode::usage, "load after the first pose, or a second map");
   graph_.load(map);
 }
 
 std::vector<Id> CompactPose::unlocated() const {
   if (graph_.located()) return {};
-  std::vector<Id> poses = graph_.kept();
+  std::vector<Id> poses = graph_.kept().ids();
   poses.resize(static_cast<std::size_t>(graph_.map_size()));
   return poses;
 }
@@ -102,7 +102,7 @@ void CompactPose::add_pose(const Variable& pose, std::span<const Factor> odometr
   if (graph_.empty()) {
     if (!odometry.empty())
       refuse(fmt::format("pose {} is the first, and moved from another", id_text(pose.id)));
-    if (graph_.size() > 0) check_new(pose);
+    if (graph_.kept().size() > 0) check_new(pose);
     report_ = {};
     report_.id = pose.id;
     start(pose);
@@ -116,7 +116,7 @@ void CompactPose::add_pose(const Variable& pose, std::span<const Factor> odometr
 
 void CompactPose::advance(const Variable& pose, std::span<const Factor> odometry) {
   check_new(pose);
-  if (pose.id == graph_.newest_id())
+  if (pose.id == graph_.newest().id())
     refuse(fmt::format("pose {} is there already", id_text(pose.id)));
   if (pose.fixed && !graph_.located()) {
     refuse(fmt::format("pose {} is held, while it is unknown where the trajectory is on the map",
@@ -124,8 +124,8 @@ void CompactPose::advance(const Variable& pose, std::span<const Factor> odometry
   }
   if (odometry.empty())
     refuse(fmt::format("pose {} comes without odometry from pose {}", id_text(pose.id),
-                       id_text(graph_.newest_id())));
-  const Motion motion = graph_.fuse(odometry, graph_.newest_id(), pose.id);
+                       id_text(graph_.newest().id())));
+  const Motion motion = graph_.group().fuse(odometry, graph_.newest().id(), pose.id);
   report_ = {};
   report_.id = pose.id;
   const Timed timed(report_.seconds.total);
@@ -139,8 +139,9 @@ void CompactPose::check_new(const Variable& pose) const {
     refuse(fmt::format("pose {} is a {}; the poses before it are {}", id_text(pose.id),
                        pose.type->tag(), graph_.group().motions().type().tag()));
   }
-  if (graph_.find(pose.id) >= 0) refuse(fmt::format("pose {} is there already", id_text(pose.id)));
-  if (graph_.landmark(pose.id) || landmarks_.waiting().type(pose.id))
+  if (graph_.kept().find(pose.id) >= 0)
+    refuse(fmt::format("pose {} is there already", id_text(pose.id)));
+  if (graph_.landmarks().type(pose.id) || landmarks_.waiting().type(pose.id))
     refuse(fmt::format("pose {} has the id of a landmark", id_text(pose.id)));
 }
 
@@ -153,15 +154,15 @@ std::optional<MatchProposal> CompactPose::next_match() {
 LinkReport CompactPose::offer(Id other, std::span<const Factor> measured) {
   if (!open_) throw Error(ErrorCode::usage, "offer without a pose");
   const Timed timed(report_.seconds.total);
-  const int pose = graph_.find(other);
+  const int pose = graph_.kept().find(other);
   if (pose < 0) {
     refuse(fmt::format("pose {} is not in the compact graph{}", other,
-                       other == graph_.newest_id() ? "; it is the newest" : ""));
+                       other == graph_.newest().id() ? "; it is the newest" : ""));
   }
-  if (other == graph_.newest_id())
+  if (other == graph_.newest().id())
     refuse(fmt::format("a link from pose {} to itself", id_text(other)));
   const Motion motion =
-      measured.empty() ? Motion() : graph_.fuse(measured, other, graph_.newest_id());
+      measured.empty() ? Motion() : graph_.group().fuse(measured, other, graph_.newest().id());
   return loops_.judge(pose, measured, motion, graph_, report_);
 }
 
@@ -202,21 +203,21 @@ PoseReport CompactPose::end_pose() {
     landmarks_.settle_left_out(graph_, report_);
   }
   open_ = false;
-  report_.kept = graph_.newest_kept();
+  report_.kept = graph_.newest().kept;
   return report_;
 }
 
 /// What is left to be used, and whether the pose is kept.
 void CompactPose::settle_pose() {
-  const bool kept = graph_.newest_kept();
+  const bool kept = graph_.newest().kept;
   landmarks_.use_known(graph_, report_);
   const bool triangulated = landmarks_.use_waiting(graph_, report_);
-  const bool by_landmarks = !kept && graph_.newest_kept();
-  if (!graph_.newest_kept() && !report_.closed_loop && report_.least_gain > gains_.pose)
+  const bool by_landmarks = !kept && graph_.newest().kept;
+  if (!graph_.newest().kept && !report_.closed_loop && report_.least_gain > gains_.pose)
     graph_.keep(report_.seconds);
   const bool added = landmarks_.add_new(graph_, report_);
-  if (!added && !triangulated && !kept && graph_.newest_kept() && gains_.pose > 0.0 &&
-      !graph_.landmarks().empty())
+  if (!added && !triangulated && !kept && graph_.newest().kept && gains_.pose > 0.0 &&
+      !graph_.landmarks().ids().empty())
     limit_poses_of_landmarks(by_landmarks);
 }
 
@@ -224,16 +225,17 @@ void CompactPose::settle_pose() {
 std::optional<Id> CompactPose::cover(int pose) {
   const DistanceTest& test = loops_.search().test();
   std::vector<std::pair<double, int>> near;
-  const PlacedState there = graph_.group().place(graph_.state(pose));
-  for (int other = 0; other < graph_.size(); ++other) {
+  const PlacedState there = graph_.group().place(graph_.kept().state(pose));
+  for (int other = 0; other < graph_.kept().size(); ++other) {
     if (other == pose || graph_.temporary(other)) continue;
-    const Pose apart = RigidGroup::seen_from(graph_.group().place(graph_.state(other)), there);
+    const Pose apart =
+        RigidGroup::seen_from(graph_.group().place(graph_.kept().state(other)), there);
     if (test.possible(apart)) near.emplace_back(apart.t.norm(), other);
   }
   std::ranges::sort(near);
   if (near.size() > kMostCovers) near.resize(kMostCovers);
   for (const auto& [distance, other] : near) {
-    if (test.passes(test.dimensions(graph_.between(other, pose)))) return graph_.id(other);
+    if (test.passes(test.dimensions(graph_.between(other, pose)))) return graph_.kept().id(other);
   }
   return std::nullopt;
 }
@@ -259,7 +261,7 @@ void CompactPose::note_leaving(const CompactGraph::Leaving& leaving) {
 }
 
 void CompactPose::make_room() {
-  if (!remover_ || graph_.size() <= options_.keep) return;
+  if (!remover_ || graph_.kept().size() <= options_.keep) return;
   std::vector<int> held = loops_.held();
   std::ranges::copy(absolute_.held(graph_), std::back_inserter(held));
   CompactGraph::Leaving leaving = graph_.make_room(*remover_, options_.keep, held, report_.seconds);
@@ -273,7 +275,7 @@ bool CompactPose::finish() {
   if (open_) throw Error(ErrorCode::usage, "finish before the newest pose was ended");
   if (graph_.empty()) return true;
   removed_.clear();
-  if (!graph_.newest_kept()) graph_.keep(report_.seconds);
+  if (!graph_.newest().kept) graph_.keep(report_.seconds);
   make_room();
   const bool converged = graph_.solve_fully();
   if (loops_.watches()) noise_scale_ = noise_scale(estimator().graph(), estimator().chi2());
@@ -282,7 +284,7 @@ bool CompactPose::finish() {
 
 std::vector<double> CompactPose::newest_state() const {
   if (graph_.empty()) throw Error(ErrorCode::usage, "newest_state before the first pose");
-  const auto state = graph_.group().view(graph_.newest_state());
+  const auto state = graph_.group().view(graph_.newest().state());
   return {state.begin(), state.end()};
 }
 

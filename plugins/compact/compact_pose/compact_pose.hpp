@@ -47,9 +47,9 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   bool finish() override;
 
   Estimator& estimator() override { return graph_.estimator(); }
-  std::vector<Id> kept() const override { return graph_.kept(); }
+  std::vector<Id> kept() const override { return graph_.kept().ids(); }
   std::vector<Id> removed() const override { return removed_; }
-  std::vector<Id> landmarks() const override { return graph_.landmarks(); }
+  std::vector<Id> landmarks() const override { return graph_.landmarks().ids(); }
   std::vector<Id> undetermined() const override { return landmarks_.waiting().ids(); }
   int factor_count() const override { return graph_.factor_count(); }
   std::optional<double> link_gain() const override { return std::max(gains_.loop, 0.0); }

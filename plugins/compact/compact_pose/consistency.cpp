@@ -18,7 +18,7 @@ bool Gate::passes(double innovation, int dof) const {
 
 ConsistencyCheck::ConsistencyCheck(const RigidGroup& group, const SensorRange& range, Gate gate,
                                    double trust)
-    : group_(group), trust_(trust) {
+    : group_(&group), trust_(trust) {
   if (!gate.on()) return;
   const int n = group.tangent_size();
   limit_ = boost::math::quantile(boost::math::chi_squared(n), gate.part);
@@ -42,7 +42,7 @@ Fit ConsistencyCheck::judge(const Vector& e, const Matrix& S) const {
 }
 
 Fit ConsistencyCheck::fit(const Link& link, const Displacement& expected) const {
-  const Vector e = group_.log(group_.between(expected.mean, link.mean));
+  const Vector e = group_->log(group_->between(expected.mean, link.mean));
   return judge(e, loose_ * expected.covariance + link.covariance);
 }
 
@@ -59,13 +59,13 @@ double ConsistencyCheck::loosen_for(const Link& link, const Displacement& expect
 /// of a motion y is carried to its other side by Ad(y⁻¹).
 Fit ConsistencyCheck::agreement(const Link& first, const Link& second, const Displacement& earlier,
                                 const Displacement& later) const {
-  const State identity = group_.between(first.mean, first.mean);
-  const State u_back = group_.between(earlier.mean, identity),
-              b_back = group_.between(second.mean, identity);
-  const State to_start = group_.compose(b_back, u_back);
-  const State cycle = group_.compose(group_.compose(to_start, first.mean), later.mean);
+  const State identity = group_->between(first.mean, first.mean);
+  const State u_back = group_->between(earlier.mean, identity),
+              b_back = group_->between(second.mean, identity);
+  const State to_start = group_->compose(b_back, u_back);
+  const State cycle = group_->compose(group_->compose(to_start, first.mean), later.mean);
   const auto carried = [&](const Matrix& S, const State& by) -> Matrix {
-    const Matrix A = group_.adjoint(group_.inverse(by));
+    const Matrix A = group_->adjoint(group_->inverse(by));
     return A * S * A.transpose();
   };
   Matrix S = carried(second.covariance, b_back);
@@ -73,7 +73,7 @@ Fit ConsistencyCheck::agreement(const Link& first, const Link& second, const Dis
   S = carried(S, u_back);
   S = carried(S, first.mean) + first.covariance;
   S = carried(S, later.mean) + later.covariance;
-  return judge(group_.log(cycle), S);
+  return judge(group_->log(cycle), S);
 }
 
 }  // namespace cairn::compact

@@ -67,7 +67,7 @@ class ConsistencyCheck {
  private:
   Fit judge(const Vector& e, const Matrix& S) const;
 
-  const RigidGroup& group_;
+  const RigidGroup* group_;
   double limit_ = 0.0;       ///< χ² quantile of the gate
   double log_volume_ = 0.0;  ///< ln of the ellipsoid's volume for S = I over the range's
   double trust_;

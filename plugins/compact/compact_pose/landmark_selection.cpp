@@ -54,14 +54,14 @@ void LandmarkSelection::offer(const LandmarkObservation& observation, const Comp
     refuse(name + " is not a point where the poses are: not a landmark");
   if (landmark.fixed) refuse(name + " is fixed, and a policy estimates all landmarks");
   const VariableType* waits = waiting_.type(landmark.id);
-  const VariableType* known = waits ? waits : graph.landmark(landmark.id);
-  if (graph.find(landmark.id) >= 0 || landmark.id == graph.newest_id() ||
+  const VariableType* known = waits ? waits : graph.landmarks().type(landmark.id);
+  if (graph.kept().find(landmark.id) >= 0 || landmark.id == graph.newest().id() ||
       (known && known->tag() != landmark.type->tag()))
     refuse(name + " has the id of something else");
   Seen seen{.landmark = landmark, .factors = {}};
   for (const Factor& factor : observation.factors) {
     seen.factors.push_back(
-        checked_observation(factor, graph.newest_id(), graph.group().motions().type(), landmark));
+        checked_observation(factor, graph.newest().id(), graph.group().motions().type(), landmark));
   }
   if (!seen.factors.empty()) seen_.push_back(std::move(seen));
 }
@@ -75,7 +75,7 @@ LandmarkSelection::Known LandmarkSelection::known(const CompactGraph& graph) con
   Known known;
   for (std::size_t k = 0; k < seen_.size(); ++k) {
     const Id id = seen_[k].landmark.id;
-    const VariableType* type = graph.landmark(id);
+    const VariableType* type = graph.landmarks().type(id);
     if (!type) continue;
     const auto at = std::ranges::find(known.landmarks, id) - known.landmarks.begin();
     if (at == std::ssize(known.landmarks)) {
@@ -83,8 +83,9 @@ LandmarkSelection::Known LandmarkSelection::known(const CompactGraph& graph) con
       known.sizes.push_back(type->tangent_size());
     }
     known.places.push_back(k);
-    known.rows.push_back(linearized(seen_[k].factors, graph.newest_id(),
-                                    graph.newest_state().data(), graph.landmark_state(id).data()));
+    known.rows.push_back(linearized(seen_[k].factors, graph.newest().id(),
+                                    graph.newest().state().data(),
+                                    graph.kept().estimator().state(id).data()));
     known.rows.back().landmark = static_cast<int>(at);
   }
   return known;
@@ -92,17 +93,17 @@ LandmarkSelection::Known LandmarkSelection::known(const CompactGraph& graph) con
 
 std::vector<ObservationFit> LandmarkSelection::choose(const Known& known, CompactGraph& graph,
                                                       PolicySeconds& seconds) const {
-  const PlacedState x = graph.group().place(graph.newest_state());
+  const PlacedState x = graph.group().place(graph.newest().state());
   // It is the pose that is not known then, not that it is near a landmark.
   const bool lost = nonlinear_poses_ >= kMostNonlinearPoses;
   const auto linear = [&](std::size_t k, const MatrixXd& joint) {
     if (everything_ || lost) return true;
     const Seen& seen = seen_[known.places[k]];
     const Id id = seen.landmark.id;
-    return is_linear(
-        graph.group(), x,
-        {*graph.landmark(id), graph.landmark_state(id), seen.factors, graph.newest_id(), x.x},
-        known.rows[k], joint);
+    return is_linear(graph.group(), x,
+                     {*graph.landmarks().type(id), graph.kept().estimator().state(id), seen.factors,
+                      graph.newest().id(), x.x},
+                     known.rows[k], joint);
   };
   return choose_observations(known.rows, known.sizes,
                              graph.landmark_covariance(known.landmarks, seconds), least_gain_,
@@ -145,7 +146,8 @@ void LandmarkSelection::use_known(CompactGraph& graph, PoseReport& report) {
 void LandmarkSelection::release_contradicted(CompactGraph& graph, PoseReport& report) {
   std::vector<Id> contradicted;
   for (const auto& [id, agreement] : agreement_) {
-    if (agreement.refused > agreement.used && graph.landmark(id)) contradicted.push_back(id);
+    if (agreement.refused > agreement.used && graph.landmarks().type(id))
+      contradicted.push_back(id);
   }
   std::ranges::sort(contradicted);
   if (contradicted.empty()) return;
@@ -159,15 +161,15 @@ LandmarkSelection::FirstPlace LandmarkSelection::place(const Seen& seen,
   GraphUpdate trial;
   trial.variables.push_back(seen.landmark);
   append(seen.factors, trial.factors);
-  const auto pose = graph.group().view(graph.newest_state());
+  const auto pose = graph.group().view(graph.newest().state());
   const std::vector<int> unplaced =
       place_variables(trial, [&](Id) { return std::span<const double>(pose); });
   if (!unplaced.empty()) return {};
   std::vector<double>& state = trial.variables.front().state;
   const ObservationRows rows =
-      linearized(seen.factors, graph.newest_id(), graph.newest_state().data(), state.data());
+      linearized(seen.factors, graph.newest().id(), graph.newest().state().data(), state.data());
   const double distance =
-      (position(*seen.landmark.type, state) - graph.group().place(graph.newest_state()).at.t)
+      (position(*seen.landmark.type, state) - graph.group().place(graph.newest().state()).at.t)
           .norm();
   // Of the standard deviation 1/|J|.
   if (!rows.e.allFinite() || !(distance * rows.J_landmark.norm() < kMostDigits)) {
@@ -175,22 +177,22 @@ LandmarkSelection::FirstPlace LandmarkSelection::place(const Seen& seen,
                 "what pose {} measured of landmark {} is left out: it puts the landmark {:.3g} m "
                 "away, of which rounding leaves no digit that was measured; expected a distance of "
                 "less than {:.0e} times its standard deviation",
-                graph.newest_id(), seen.landmark.id, distance, kMostDigits)};
+                graph.newest().id(), seen.landmark.id, distance, kMostDigits)};
   }
   if (rank(rows.J_landmark) < seen.landmark.type->tangent_size()) return {};
   return {.state = std::move(state)};
 }
 
 bool LandmarkSelection::add_new(CompactGraph& graph, PoseReport& report) {
-  const bool kept = graph.newest_kept();
+  const bool kept = graph.newest().kept;
   std::vector<Variable> added;
   std::vector<Factor> factors;
   std::vector<Seen> undetermined;
   for (Seen& seen : std::exchange(seen_, {})) {
     const Id id = seen.landmark.id;
     const bool twice = std::ranges::find(added, id, &Variable::id) != added.end();
-    if (graph.landmark(id)) {  // by another measurement of the pose
-      const View view{.pose = graph.newest_id(), .factors = std::move(seen.factors)};
+    if (graph.landmarks().type(id)) {  // by another measurement of the pose
+      const View view{.pose = graph.newest().id(), .factors = std::move(seen.factors)};
       judge_views(id, {&view, 1}, graph, report);
       continue;
     }
@@ -224,7 +226,7 @@ bool LandmarkSelection::add_new(CompactGraph& graph, PoseReport& report) {
     for (const Id id : ids) {
       if (gate_.on()) agreement_[id].used = 1;
       // If it has left at once, it waits with all of its views.
-      if (graph.landmark(id)) judge_views(id, waiting_.take(id), graph, report);
+      if (graph.landmarks().type(id)) judge_views(id, waiting_.take(id), graph, report);
     }
   }
   for (const Seen& seen : undetermined) any = add_or_wait(seen, graph, report) || any;
@@ -232,10 +234,10 @@ bool LandmarkSelection::add_new(CompactGraph& graph, PoseReport& report) {
 }
 
 bool LandmarkSelection::use_waiting(CompactGraph& graph, PoseReport& report) {
-  if (graph.newest_kept()) return false;  // then all that are determined are added
+  if (graph.newest().kept) return false;  // then all that are determined are added
   for (std::size_t k = 0; k < seen_.size(); ++k) {
     const Id id = seen_[k].landmark.id;
-    if (graph.landmark(id) || !waiting_.has_views(id)) continue;
+    if (graph.landmarks().type(id) || !waiting_.has_views(id)) continue;
     WaitingLandmark all = waiting_.with_newest(seen_[k].landmark, seen_[k].factors, graph);
     std::optional<Triangulated> found = waiting_.triangulate(all, graph, report.seconds);
     if (!found || !(found->found.fit.gain > least_gain_) || !waiting_.agree(*found)) continue;
@@ -250,8 +252,8 @@ bool LandmarkSelection::use_waiting(CompactGraph& graph, PoseReport& report) {
 /// now.
 bool LandmarkSelection::add_or_wait(const Seen& seen, CompactGraph& graph, PoseReport& report) {
   const Id id = seen.landmark.id;
-  if (graph.landmark(id)) {  // by another measurement of the pose
-    const View view{.pose = graph.newest_id(), .factors = seen.factors};
+  if (graph.landmarks().type(id)) {  // by another measurement of the pose
+    const View view{.pose = graph.newest().id(), .factors = seen.factors};
     judge_views(id, {&view, 1}, graph, report);
     return true;
   }
@@ -259,7 +261,7 @@ bool LandmarkSelection::add_or_wait(const Seen& seen, CompactGraph& graph, PoseR
                          .landmark = id,
                          .factors = static_cast<int>(std::ssize(seen.factors)),
                          .gain = std::numeric_limits<double>::infinity()};
-  if (!waiting_.may_wait(id) || !graph.newest_kept()) {
+  if (!waiting_.may_wait(id) || !graph.newest().kept) {
     waiting_.note(seen.landmark);
     report.landmarks.push_back(outcome);
     return false;
@@ -306,16 +308,16 @@ void LandmarkSelection::add_triangulated(WaitingLandmark waiting, Triangulated t
 void LandmarkSelection::judge_views(Id landmark, std::span<const View> views, CompactGraph& graph,
                                     PoseReport& report) {
   for (const View& view : views) {
-    const VariableType* type = graph.landmark(landmark);
+    const VariableType* type = graph.landmarks().type(landmark);
     if (!type) {  // it has left again
       waiting_.add(landmark, view, graph);
       continue;
     }
     const std::vector<int> size{type->tangent_size()};
-    const int pose = graph.find(view.pose);
+    const int pose = graph.kept().find(view.pose);
     MatrixXd covariance = graph.landmark_covariance(landmark, pose, report.seconds);
-    const PlacedState x = graph.group().place(graph.state(pose));
-    const std::span<const double> state = graph.landmark_state(landmark);
+    const PlacedState x = graph.group().place(graph.kept().state(pose));
+    const std::span<const double> state = graph.kept().estimator().state(landmark);
     // At the estimate that the covariance is of.
     const std::vector<ObservationRows> rows{
         linearized(view.factors, view.pose, x.x.data(), state.data())};
@@ -343,7 +345,7 @@ void LandmarkSelection::see(std::vector<Variable> added, std::span<const Factor>
 }
 
 void LandmarkSelection::settle_left_out(CompactGraph& graph, PoseReport& report) {
-  for (const CompactGraph::LeftOut& left : graph.take_left_out()) {
+  for (const LeftOut& left : graph.take_left_out()) {
     const Id id = left.landmark.id;
     if (left.removed) {
       waiting_.note_left(left.landmark);
@@ -351,7 +353,7 @@ void LandmarkSelection::settle_left_out(CompactGraph& graph, PoseReport& report)
     }
     for (const auto& [pose, factor] : left.factors) {
       // What a pose measured that leaves with it, or was not kept, is lost.
-      const bool waits = left.removed && waiting_.may_wait(id) && graph.find(pose) >= 0;
+      const bool waits = left.removed && waiting_.may_wait(id) && graph.kept().find(pose) >= 0;
       report.landmarks.push_back({.pose = pose,
                                   .landmark = id,
                                   .factors = 1,

@@ -41,13 +41,13 @@ void LoopSelection::advance(const Motion& motion, const RigidGroup& group) {
 LinkReport LoopSelection::judge(int pose, std::span<const Factor> measured, const Motion& motion,
                                 CompactGraph& graph, PoseReport& report) {
   search_.search(graph, matches_, report);
-  LinkReport outcome{.earlier = graph.id(pose), .later = graph.newest_id()};
+  LinkReport outcome{.earlier = graph.kept().id(pose), .later = graph.newest().id()};
   const std::optional<Candidate> candidate = search_.take(pose);
   if (candidate) outcome.expected_gain = candidate->gain;
   matches_.note_answer(pose, !measured.empty());
   if (!measured.empty()) {
     Link link{.earlier = pose,
-              .later = graph.newest_kept() ? graph.size() - 1 : graph.size(),
+              .later = graph.newest().kept ? graph.kept().size() - 1 : graph.kept().size(),
               .factors = {measured.begin(), measured.end()},
               .motion = motion,
               .mean = graph.group().state(motion.mean),
@@ -120,17 +120,17 @@ void LoopSelection::follow_refused(const Motion& motion, const RigidGroup& group
 /// matches that agree so with each other are one place that looks like another.
 bool LoopSelection::doubts_odometry(const Link& link, const Displacement& expected,
                                     CompactGraph& graph, PoseReport& report) {
-  const Id earlier = graph.id(link.earlier);
+  const Id earlier = graph.kept().id(link.earlier);
   std::set<Id> agree;
   for (const Refused& other : refused_) {
-    const int pose = graph.find(other.earlier);
-    if (pose < 0 || other.later == graph.newest_id()) continue;
+    const int pose = graph.kept().find(other.earlier);
+    if (pose < 0 || other.later == graph.newest().id()) continue;
     const Fit fit =
         check_->agreement(other.link, link, graph.between(pose, link.earlier), other.since);
     if (fit.consistent && !check_->needs_another(fit)) agree.insert(other.later);
   }
   if (agree.size() < kAgreeing || !check_->on()) {
-    Refused refused{earlier, graph.newest_id(), link, expected};
+    Refused refused{earlier, graph.newest().id(), link, expected};
     refused.since.mean = graph.group().between(link.mean, link.mean);
     refused.since.covariance.setZero();
     refused_.push_back(std::move(refused));
@@ -141,10 +141,9 @@ bool LoopSelection::doubts_odometry(const Link& link, const Displacement& expect
   if (!check_->fit(link, expected).consistent) return false;
   report.notes.push_back(fmt::format(
       "matches of {} poses that the gate refused agree with that of poses {} and {}: odometry is "
-      "less "
-      "certain than its covariances say, and the gate takes standard deviations as {:.3g} times "
-      "larger from now on",
-      agree.size(), earlier, graph.newest_id(), std::sqrt(loose)));
+      "less certain than its covariances say, and the gate takes standard deviations as {:.3g} "
+      "times larger from now on",
+      agree.size(), earlier, graph.newest().id(), std::sqrt(loose)));
   refused_.clear();
   return true;
 }
@@ -152,7 +151,7 @@ bool LoopSelection::doubts_odometry(const Link& link, const Displacement& expect
 bool LoopSelection::agrees_with_waiting(const Link& link, CompactGraph& graph, PoseReport& report) {
   return std::ranges::any_of(waiting_, [&](const Waiting& waiting) {
     const Link& other = waiting.link;
-    const bool kept = link.later < graph.size();
+    const bool kept = link.later < graph.kept().size();
     if (other.earlier == link.earlier && other.later == link.later) return false;
     if (!graph.connected(other.earlier, link.earlier)) return false;
     // Before it is kept, the newest pose is known by its displacement only.
@@ -176,8 +175,9 @@ std::optional<double> LoopSelection::relocation(const Link& link, const CompactG
   // Where another pose would have to leave, information is lost in any case.
   if (!options_.reuse && !graph.full()) return std::nullopt;
   if (!(pose_gain_ > 0.0)) return std::nullopt;  // every pose is to be kept
-  const double n = graph.group().tangent_size();
-  const double of_way = part_of_way(graph.newest_odometry(), link.covariance);
+  const int n = graph.group().tangent_size();
+  const Matrix way = to_matrix(graph.newest().odometry.covariance, n);
+  const double of_way = part_of_way(way, link.covariance);
   const Matrix rest = link.covariance / (1.0 - of_way);
   // Three matches in one are as good as any; a lower g_pose must not keep poses of one place for
   // ever.
@@ -185,14 +185,13 @@ std::optional<double> LoopSelection::relocation(const Link& link, const CompactG
   if (!(mutual_information(matches_.typical().covariance(), rest) < enough)) return std::nullopt;
   // Where the bridge is not informative, nothing is divided.
   if (graph.full()) return of_way;
-  const Matrix end = graph.newest_odometry() + link.covariance;
-  const double lost = mutual_information(end, link.covariance);
+  const double lost = mutual_information(way + link.covariance, link.covariance);
   if (lost > options_.reuse_loss * report.candidates * n) return std::nullopt;
   return of_way;
 }
 
 void LoopSelection::use(const Link& link, CompactGraph& graph, PoseReport& report) {
-  const bool of_newest = link.later == graph.size() && !graph.newest_kept();
+  const bool of_newest = link.later == graph.kept().size() && !graph.newest().kept;
   if (!graph.connected(link.earlier, link.later)) {
     graph.locate(link.earlier, link.mean, link.factors, report.seconds);
     search_.restart(report);  // the poses of the map are candidates from now on
@@ -245,7 +244,7 @@ bool LoopSelection::forget(Id a, Id b, bool was_there, const CompactGraph& graph
 void LoopSelection::end_pose(CompactGraph& graph, PoseReport& report) {
   search_.search(graph, matches_, report);
   if (search_.silenced(graph, report)) matches_.note_silence();
-  if (graph.predecessor() >= 0 && report.candidates > 0 && watches())
+  if (graph.newest().predecessor >= 0 && report.candidates > 0 && watches())
     matches_.thresholds().note_pose(report.least_gain);
   for (const Candidate& left : search_.left())
     report.most_gain = std::max(report.most_gain, left.gain);

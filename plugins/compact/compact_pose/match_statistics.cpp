@@ -19,7 +19,7 @@ void MatchStatistics::forget(Id a, Id b, const CompactGraph& graph) {
     if (std::minmax(match.earlier, match.later) != std::minmax(a, b)) return false;
     typical_.forget(match.covariance);
     if (match.sampled) thresholds_.forget_loop(match.gain, match.covariance);
-    if (const int pose = graph.find(match.earlier); pose >= 0) record_.revoke(pose);
+    if (const int pose = graph.kept().find(match.earlier); pose >= 0) record_.revoke(pose);
     return true;
   });
 }

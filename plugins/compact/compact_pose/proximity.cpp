@@ -113,13 +113,13 @@ double SensorRange::radius(int dimension) const {
 }
 
 DistanceTest::DistanceTest(const RigidGroup& group, const SensorRange& range)
-    : group_(group), range_(range), reach_(reach(range.probability)) {
+    : group_(&group), range_(range), reach_(reach(range.probability)) {
   if (group.dimension() == 2) range_.test = RotationTest::elements;  // there is one angle
 }
 
 bool DistanceTest::possible(const Pose& d) const {
   if (reach_ == kInfinity) return true;
-  for (int r = 0; r < group_.dimension(); ++r) {
+  for (int r = 0; r < group_->dimension(); ++r) {
     if (std::abs(d.t[r]) > reach_ * range_.translation[r]) return false;
   }
   const double most = reach_ * range_.rotation;
@@ -129,11 +129,11 @@ bool DistanceTest::possible(const Pose& d) const {
 }
 
 Dimensions DistanceTest::dimensions(const Displacement& d) const {
-  const Eigen::Matrix<double, 6, 6> twist = group_.twist_covariance(d.covariance);
+  const Eigen::Matrix<double, 6, 6> twist = group_->twist_covariance(d.covariance);
   const Matrix3d T = d.at.R * twist.topLeftCorner<3, 3>() * d.at.R.transpose(),
                  S = twist.bottomRightCorner<3, 3>();
   Dimensions out;
-  out.translations = group_.dimension();
+  out.translations = group_->dimension();
   for (int r = 0; r < out.translations; ++r) {
     out.t_mean[r] = d.at.t[r];
     out.t_sigma[r] = std::sqrt(std::max(0.0, T(r, r)));

@@ -71,7 +71,7 @@ class DistanceTest {
  private:
   double rotation_probability(double mean, double sigma) const;
 
-  const RigidGroup& group_;
+  const RigidGroup* group_;
   SensorRange range_;
   double reach_;
 };

@@ -105,7 +105,7 @@ void RandomPoses::add_pose(const Variable& pose, std::span<const Factor> odometr
     throw Error(ErrorCode::usage,
                 "random_poses draws from a recording; it cannot follow a robot live");
   }
-  if (!graph_.empty() && (graph_.find(pose.id) >= 0 || pose.id == graph_.newest_id())) {
+  if (!graph_.empty() && (graph_.kept().find(pose.id) >= 0 || pose.id == graph_.newest().id())) {
     throw Error(ErrorCode::input, "pose " + std::to_string(pose.id) + " is there already");
   }
   report_ = {};
@@ -114,7 +114,7 @@ void RandomPoses::add_pose(const Variable& pose, std::span<const Factor> odometr
   if (graph_.empty()) {
     graph_.start(pose, report_.seconds);
   } else {
-    const Motion motion = graph_.fuse(odometry, graph_.newest_id(), pose.id);
+    const Motion motion = graph_.group().fuse(odometry, graph_.newest().id(), pose.id);
     graph_.advance(pose, motion, odometry.front().type);
     if (kept_.contains(pose.id) || pose.fixed) graph_.keep(report_.seconds);
   }
@@ -130,7 +130,7 @@ std::optional<MatchProposal> RandomPoses::next_match() {
 }
 
 LinkReport RandomPoses::offer(Id other, std::span<const Factor> measured) {
-  if (graph_.empty() || graph_.find(other) < 0 || other == graph_.newest_id()) {
+  if (graph_.empty() || graph_.kept().find(other) < 0 || other == graph_.newest().id()) {
     throw Error(ErrorCode::input,
                 "pose " + std::to_string(other) + " is not another pose of the compact graph");
   }
@@ -149,11 +149,11 @@ LinkReport RandomPoses::offer(Id other, std::span<const Factor> measured) {
 
 PriorReport RandomPoses::offer_prior(const Factor& measured) {
   PriorReport prior{.pose = report_.id};
-  if (graph_.newest_kept() && graph_.referenced()) {
+  if (graph_.newest().kept && graph_.referenced()) {
     graph_.link({&measured, 1}, report_.seconds);
     prior.verdict = LinkVerdict::linked;
-  } else if (graph_.newest_kept()) {
-    const State& x = graph_.newest_state();
+  } else if (graph_.newest().kept) {
+    const State& x = graph_.newest().state();
     const AbsoluteMeasurement first(measured, report_.id, graph_.group().motions().type());
     const FrameEstimate frame(graph_.group(), {{&first, x}}, x,
                               graph_.joint_covariance({}, report_.seconds).replicate(2, 2));
@@ -167,19 +167,19 @@ PriorReport RandomPoses::offer_prior(const Factor& measured) {
 }
 
 PoseReport RandomPoses::end_pose() {
-  report_.kept = graph_.newest_kept();
+  report_.kept = graph_.newest().kept;
   return report_;
 }
 
 bool RandomPoses::finish() {
   if (graph_.empty()) return true;
-  if (!graph_.newest_kept()) graph_.keep(report_.seconds);
+  if (!graph_.newest().kept) graph_.keep(report_.seconds);
   return graph_.solve_fully();
 }
 
 std::vector<double> RandomPoses::newest_state() const {
   if (graph_.empty()) throw Error(ErrorCode::usage, "newest_state before the first pose");
-  const auto state = graph_.group().view(graph_.newest_state());
+  const auto state = graph_.group().view(graph_.newest().state());
   return {state.begin(), state.end()};
 }
 

@@ -73,7 +73,7 @@ class RandomPoses final : public PosePolicy {
   bool finish() override;
 
   Estimator& estimator() override { return graph_.estimator(); }
-  std::vector<Id> kept() const override { return graph_.kept(); }
+  std::vector<Id> kept() const override { return graph_.kept().ids(); }
   int factor_count() const override { return graph_.factor_count(); }
   std::vector<double> newest_state() const override;
   const std::vector<OdometryChain>& chains() const override { return graph_.chains(); }

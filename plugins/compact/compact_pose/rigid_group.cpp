@@ -3,7 +3,9 @@
 
 #include <cmath>
 #include <string>
+#include <vector>
 
+#include <fmt/core.h>
 #include <Eigen/Geometry>
 
 #include "cairn/information/gaussian.hpp"
@@ -90,6 +92,28 @@ void RigidGroup::check_rigid() const {
     if ((ab.R - a.R * b.R).norm() > 1e-9 || (ab.t - a.t - a.R * b.t).norm() > 1e-9)
       refuse(motions_.type(), "composes in another way");
   }
+}
+
+Motion RigidGroup::fuse(std::span<const Factor> factors, Id from, Id to) const {
+  const auto refuse = [](const std::string& message) { throw Error(ErrorCode::input, message); };
+  if (factors.empty())
+    refuse(fmt::format("no measured relative pose from pose {} to {}", from, to));
+  Motion all;
+  for (const Factor& factor : factors) {
+    const auto& on = factor.variables;
+    const bool forwards = on == std::vector<Id>{from, to}, back = on == std::vector<Id>{to, from};
+    if (!forwards && !back)
+      refuse(fmt::format("a measurement that is not between poses {} and {}", from, to));
+    if (!factor.type) refuse("a measurement without a type");
+    if (!factor.type->is_relative() ||
+        factor.type->variable_tags().front() != motions_.type().tag()) {
+      refuse(fmt::format("{} between {} and {} is not a relative pose of {}", factor.type->tag(),
+                         from, to, motions_.type().tag()));
+    }
+    const Motion motion = motions_.of_factor(factor, from);
+    all = all.mean.empty() ? motion : motions_.fuse(all, motion);
+  }
+  return all;
 }
 
 PlacedState RigidGroup::place(const State& x) const {

@@ -43,6 +43,9 @@ class RigidGroup : public PoseGroup {
   int dimension() const { return dimension_; }
 
   PlacedState place(const State& x) const;
+  /// All measurements of the relative pose of two poses, fused. Throws `Error` (input) if one of
+  /// them measures something else.
+  Motion fuse(std::span<const Factor> factors, Id from, Id to) const;
 
   /// Where x_n is as seen from x_i.
   static Pose seen_from(const PlacedState& x_i, const PlacedState& x_n);

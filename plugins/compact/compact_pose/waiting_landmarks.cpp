@@ -34,8 +34,8 @@ std::vector<PlacedView> placed_views(const WaitingLandmark& waiting,
                                      const CompactGraph& graph) {
   const RigidGroup& group = graph.group();
   const auto state = [&](const View& view) -> const State& {
-    const int pose = graph.find(view.pose);
-    return pose < 0 ? graph.newest_state() : graph.state(pose);
+    const int pose = graph.kept().find(view.pose);
+    return pose < 0 ? graph.newest().state() : graph.kept().state(pose);
   };
   const PlacedState last = group.place(state(waiting.views[chosen.back()]));
   std::vector<PlacedView> views;
@@ -93,8 +93,8 @@ WaitingLandmark WaitingLandmarks::with_newest(const Variable& landmark,
                                               const CompactGraph& graph) const {
   WaitingLandmark all{.landmark = landmark, .views = {}};
   if (const auto known = waiting_.find(landmark.id); known != waiting_.end()) all = known->second;
-  if (all.views.empty() || all.views.back().pose != graph.newest_id())
-    all.views.push_back({.pose = graph.newest_id(), .factors = {}});
+  if (all.views.empty() || all.views.back().pose != graph.newest().id())
+    all.views.push_back({.pose = graph.newest().id(), .factors = {}});
   std::vector<Measured>& last = all.views.back().factors;
   last.insert(last.end(), factors.begin(), factors.end());
   return all;
@@ -107,7 +107,7 @@ std::optional<Triangulated> WaitingLandmarks::triangulate(const WaitingLandmark&
   std::vector<int> poses;
   for (const std::size_t k : all) {
     const Id pose = waiting.views[k].pose;
-    if (pose != graph.newest_id()) poses.push_back(graph.find(pose));
+    if (pose != graph.newest().id()) poses.push_back(graph.kept().find(pose));
   }
   const Eigen::MatrixXd covariance = graph.joint_covariance(poses, seconds);
   const Eigen::Index n = graph.group().tangent_size();
@@ -183,7 +183,7 @@ void WaitingLandmarks::add(WaitingLandmark waiting, const CompactGraph& graph, P
   const auto waits = [](const auto& one) { return !one.second.views.empty(); };
   while (std::ranges::count_if(waiting_, waits) > most_) {
     const auto last_seen = [&](const auto& one) {
-      return waits(one) ? graph.find(one.second.views.back().pose)
+      return waits(one) ? graph.kept().find(one.second.views.back().pose)
                         : std::numeric_limits<int>::max();
     };
     auto& [id, oldest] = *std::ranges::min_element(waiting_, {}, last_seen);
@@ -193,9 +193,9 @@ void WaitingLandmarks::add(WaitingLandmark waiting, const CompactGraph& graph, P
 }
 
 void WaitingLandmarks::add(Id landmark, const View& view, const CompactGraph& graph) {
-  if (!may_wait(landmark) || graph.find(view.pose) < 0) return;
+  if (!may_wait(landmark) || graph.kept().find(view.pose) < 0) return;
   std::vector<View>& views = waiting_.at(landmark).views;
-  const auto number = [&](Id pose) { return graph.find(pose); };
+  const auto number = [&](Id pose) { return graph.kept().find(pose); };
   const auto at = std::ranges::lower_bound(views, number(view.pose), {},
                                            [&](const View& other) { return number(other.pose); });
   if (at != views.end() && at->pose == view.pose) {

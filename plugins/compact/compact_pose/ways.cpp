@@ -9,6 +9,11 @@ bool Way::has_match() const {
   return start || end || std::ranges::any_of(parts, &WayPart::matched);
 }
 
+bool Way::has_match_of(Id a, Id b) const {
+  return (end && end->is_match_of(a, b)) ||
+         std::ranges::any_of(parts, [&](const WayPart& part) { return part.is_match_of(a, b); });
+}
+
 Motion part_of(const Motion& match, double of_way) {
   Motion part = match;
   for (double& entry : part.covariance) entry /= of_way;
@@ -59,14 +64,25 @@ void Ways::close(Id to, Way::Became became) {
   open_ = {};
 }
 
+bool Ways::has(Id a, Id b) const {
+  return open_.has_match_of(a, b) ||
+         std::ranges::any_of(ways_, [&](const Way& way) { return way.has_match_of(a, b); });
+}
+
+void Ways::replace(Change change) {
+  const auto first = ways_.begin() + static_cast<std::ptrdiff_t>(change.first);
+  const auto at = ways_.erase(first, first + static_cast<std::ptrdiff_t>(change.count));
+  if (change.open) {
+    open_ = std::move(change.now.back());
+    change.now.pop_back();
+  }
+  ways_.insert(at, change.now.begin(), change.now.end());
+}
+
 std::optional<Ways::Change> Ways::without(
     Id a, Id b, const MotionGroup& group, CompositionOrder order,
     const std::function<double(const Way&, const Motion&)>& of_way) const {
-  const auto has = [&](const Way& way) {
-    return (way.end && way.end->is_match_of(a, b)) ||
-           std::ranges::any_of(way.parts,
-                               [&](const WayPart& part) { return part.is_match_of(a, b); });
-  };
+  const auto has = [&](const Way& way) { return way.has_match_of(a, b); };
   const auto found = std::ranges::find_if(ways_, has);
   if (found == ways_.end() && !has(open_)) return std::nullopt;
   Change change;

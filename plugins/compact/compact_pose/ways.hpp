@@ -49,6 +49,7 @@ struct Way {
       bridge{};  ///< what it adds to the factor, from the smaller number of the two to the larger
 
   bool has_match() const;
+  bool has_match_of(Id a, Id b) const;
 };
 
 /// `of_way`, or all, of the information of a match.
@@ -71,6 +72,7 @@ class Ways {
   };
 
   std::deque<Way>& all() { return ways_; }
+  const std::deque<Way>& all() const { return ways_; }
   Way& open() { return open_; }
   /// The trajectory goes on from a kept pose.
   void begin(Id from);
@@ -79,11 +81,14 @@ class Ways {
   /// Ends the open way.
   void close(Id to, Way::Became became);
 
+  /// Whether there is a match of two poses among them.
+  bool has(Id a, Id b) const;
   /// How the ways would be without the match of two poses; nothing: it is in none of them.
   /// `of_way` divides a match that ends a way now, and did not before.
   std::optional<Change> without(
       Id a, Id b, const MotionGroup& group, CompositionOrder order,
       const std::function<double(const Way&, const Motion&)>& of_way) const;
+  void replace(Change change);
 
  private:
   std::deque<Way> ways_;

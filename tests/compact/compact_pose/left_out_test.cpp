@@ -26,7 +26,7 @@ using testing::SizeIs;
 constexpr Id kLandmark = 1000;
 
 /// A robot in the plane that drives along x, sees bearings, and knows where it truly is.
-class LeftOut : public testing::Test {
+class WithBearings : public testing::Test {
  protected:
   static constexpr double kBearing = 0.02;  ///< [rad]
 
@@ -48,7 +48,7 @@ class LeftOut : public testing::Test {
 };
 
 /// The graph alone.
-class LeftOutOfTheGraph : public LeftOut {
+class LeftOutOfTheGraph : public WithBearings {
  protected:
   void drive(int poses) {
     graph_.start(world_.variable(0, world_.identity(), true), seconds_);
@@ -70,9 +70,9 @@ TEST_F(LeftOutOfTheGraph, IsALandmarkThatItsBearingsDoNotDetermine) {
   std::vector<Factor> seen;
   for (Id pose = 0; pose < 4; ++pose) seen.push_back(bearing(pose, 0.0));
   graph_.see({point(kLandmark, 20.0, 0.0)}, seen, seconds_);
-  EXPECT_THAT(graph_.landmarks(), IsEmpty());
-  EXPECT_EQ(graph_.landmark(kLandmark), nullptr);
-  const std::vector<CompactGraph::LeftOut> left = graph_.take_left_out();
+  EXPECT_THAT(graph_.landmarks().ids(), IsEmpty());
+  EXPECT_EQ(graph_.landmarks().type(kLandmark), nullptr);
+  const std::vector<LeftOut> left = graph_.take_left_out();
   ASSERT_THAT(left, SizeIs(1));
   EXPECT_TRUE(left.front().removed);
   EXPECT_EQ(left.front().landmark.id, kLandmark);
@@ -100,10 +100,10 @@ TEST_F(LeftOutOfTheGraph, AreTheLandmarksThatAreToBeReleased) {
     graph_.see({point(id, at.x(), at.y())}, seen, seconds_);
   }
   EXPECT_THAT(graph_.take_left_out(), IsEmpty());
-  ASSERT_THAT(graph_.landmarks(), ElementsAre(kLandmark, kLandmark + 1));
+  ASSERT_THAT(graph_.landmarks().ids(), ElementsAre(kLandmark, kLandmark + 1));
   const std::array<Id, 1> one{kLandmark};
   graph_.release(one, seconds_);
-  EXPECT_THAT(graph_.landmarks(), ElementsAre(kLandmark + 1));
+  EXPECT_THAT(graph_.landmarks().ids(), ElementsAre(kLandmark + 1));
   EXPECT_THAT(graph_.take_left_out(), SizeIs(1));
   EXPECT_EQ(graph_.factor_count(), 3 + 4);
 }
@@ -124,17 +124,17 @@ TEST_F(LeftOutOfTheGraph, IsABearingOfALandmarkOnItsPose) {
   const Factor on_it = bearing(3, 1.0);
   graph_.add({&on_it, 1}, seconds_);
   // Either the estimate has covariances with it, or it has left alone.
-  for (const CompactGraph::LeftOut& left : graph_.take_left_out()) {
+  for (const LeftOut& left : graph_.take_left_out()) {
     EXPECT_FALSE(left.removed);
     ASSERT_THAT(left.factors, SizeIs(1));
     EXPECT_EQ(left.factors.front().first, 3);
   }
-  EXPECT_THAT(graph_.landmarks(), ElementsAre(kLandmark));
+  EXPECT_THAT(graph_.landmarks().ids(), ElementsAre(kLandmark));
   EXPECT_TRUE(graph_.covariance(3).allFinite());
 }
 
 /// A policy.
-class LeftOutOfASession : public LeftOut {
+class LeftOutOfASession : public WithBearings {
  protected:
   void begin(const std::string& options) {
     policy_ = registry_.make<PosePolicy>("compact_pose:reuse=true," + options);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Poses that landmarks locate: which of them stay.
-#include "temporary_poses.hpp"
+#include "information_loss.hpp"
 
 #include <algorithm>
 #include <array>
