@@ -31,8 +31,9 @@ void clear_rows(const System& system, const Node& node, AlignedVector& X) {
   for (const std::int32_t v : node.own_variables())
     std::fill_n(X.data() + system.offset(v) * 8, std::int64_t{system.size(v)} * 8, 0.0);
 }
-void clear_path(const System& system, const Tree& tree, AlignedVector& X) {
-  for (const std::int32_t n : tree.path()) clear_rows(system, tree.nodes()[n], X);
+void clear_path(const System& system, const Tree& tree, const Substitution& substitution,
+                AlignedVector& X) {
+  for (const std::int32_t n : substitution.path()) clear_rows(system, tree.nodes()[n], X);
 }
 
 /// Whether |s| Σ H_ii ‖X_i‖² over a node's separator, of the first `width` columns, is no more than
@@ -108,7 +109,7 @@ void Covariances::note(const Models& models, const System& system, int f, double
   }
 }
 
-MarginalsBy Covariances::update(const System& system, Tree& tree,
+MarginalsBy Covariances::update(const System& system, const Tree& tree, Substitution& substitution,
                                 std::span<const std::uint8_t> held) {
   MarginalsBy by = keeps_anything() ? MarginalsBy::unchanged : MarginalsBy::none;
   if (kept_ == KeptMarginals::diagonal) {
@@ -118,14 +119,15 @@ MarginalsBy Covariances::update(const System& system, Tree& tree,
       diagonal_.resize(diagonal_.size() + static_cast<std::size_t>(size * size), 0.0);
     }
     if (!everything_ && (!rows_.empty() || !fresh_.empty()))
-      by = downdate(system, tree, held) ? MarginalsBy::downdate : MarginalsBy::recomputation;
+      by = downdate(system, tree, substitution, held) ? MarginalsBy::downdate
+                                                      : MarginalsBy::recomputation;
     if (everything_) by = MarginalsBy::recomputation;
     if (by == MarginalsBy::recomputation) recompute(system, tree);
   } else if (kept_ == KeptMarginals::last) {
     by = MarginalsBy::recomputation;
   }
   if (!crosses_.empty()) {
-    solve_crosses(system, tree, held);
+    solve_crosses(system, tree, substitution, held);
     if (by == MarginalsBy::unchanged) by = MarginalsBy::recomputation;
   }
   everything_ = false;
@@ -137,7 +139,8 @@ MarginalsBy Covariances::update(const System& system, Tree& tree,
 }
 
 /// False if it cannot be done accurately.
-bool Covariances::downdate(const System& system, Tree& tree, std::span<const std::uint8_t> held) {
+bool Covariances::downdate(const System& system, const Tree& tree, Substitution& substitution,
+                           std::span<const std::uint8_t> held) {
   if (rows_.size() > kMostRows || ++age_ > kOldest) return false;
   if (!fresh_.empty() && !rows_.empty() && !take_out_fresh(system, tree)) return false;
   const std::size_t n = rows_.size(), groups = (n + 7) / 8;
@@ -147,19 +150,20 @@ bool Covariances::downdate(const System& system, Tree& tree, std::span<const std
       for (std::size_t e = rows_[r].begin; e < rows_[r].begin + rows_[r].count; ++e)
         B[static_cast<std::size_t>(entries_[e].scalar) * 8 + r % 8] += entries_[e].value;
     }
-    tree.forward_many(sources_, B);
+    substitution.forward_many(system, tree, sources_, B);
   }
-  if (n > 0 && !scale_rows(system, tree)) {
-    for (std::size_t g = 0; g < groups; ++g) clear_path(system, tree, B_[g]);
+  if (n > 0 && !scale_rows(system, tree, substitution)) {
+    for (std::size_t g = 0; g < groups; ++g) clear_path(system, tree, substitution, B_[g]);
     return false;
   }
   for (std::size_t g = 0; g < groups; ++g) {
     const double* const signs = signs_.data() + g * 8;
-    n - g * 8 <= 4 ? apply<4>(system, tree, B_[g], signs) : apply<8>(system, tree, B_[g], signs);
+    n - g * 8 <= 4 ? apply<4>(system, tree, substitution, B_[g], signs)
+                   : apply<8>(system, tree, substitution, B_[g], signs);
   }
   for (const std::int32_t v : fresh_) {
     std::fill_n(diagonal(v), system.size(v) * system.size(v), 0.0);
-    if (!held[v] && tree.node_of(v) >= 0) solve_for(system, tree, v);
+    if (!held[v] && tree.node_of(v) >= 0) solve_for(system, tree, substitution, v);
   }
   return true;
 }
@@ -231,10 +235,11 @@ bool Covariances::take_out_fresh(const System& system, const Tree& tree) {
 
 /// Y, in B_, becomes Y Q |Λ|^(−1/2) with Q Λ Qᵀ = U = S − Yᵀ Y. False if U is too badly
 /// conditioned.
-bool Covariances::scale_rows(const System& system, const Tree& tree) {
+bool Covariances::scale_rows(const System& system, const Tree& tree,
+                             const Substitution& substitution) {
   const std::size_t n = rows_.size();
   const auto for_each_row = [&](const auto& visit) {
-    for (const std::int32_t node : tree.path()) {
+    for (const std::int32_t node : substitution.path()) {
       for (const std::int32_t v : tree.nodes()[node].own_variables()) {
         const std::size_t first = static_cast<std::size_t>(system.offset(v));
         for (std::size_t row = first; row < first + static_cast<std::size_t>(system.size(v)); ++row)
@@ -276,13 +281,14 @@ bool Covariances::scale_rows(const System& system, const Tree& tree) {
 /// C ← L⁻ᵀ C, then Σ ← Σ − C sign(Λ) Cᵀ on the diagonal; leaves C as zero. Its columns from
 /// `width` on are zero.
 template <int width>
-void Covariances::apply(const System& system, Tree& tree, AlignedVector& C, const double* signs) {
+void Covariances::apply(const System& system, const Tree& tree, Substitution& substitution,
+                        AlignedVector& C, const double* signs) {
   visited_.clear();
   const auto enter = [&](const Node& node) {
     return !changes_nothing_below<width>(system, node, C);
   };
   const auto subtract = [&](const Node& node) {
-    visited_.push_back(static_cast<std::int32_t>(&node - tree.nodes().data()));
+    visited_.push_back(tree.number_of(node));
     for (const std::int32_t v : node.own_variables()) {
       const std::int32_t size = system.size(v);
       double* const block = diagonal(v);
@@ -299,11 +305,11 @@ void Covariances::apply(const System& system, Tree& tree, AlignedVector& C, cons
       }
     }
   };
-  tree.backward_many(C, enter, subtract);
+  substitution.backward_many(system, tree, C, enter, subtract);
   for (const std::int32_t n : visited_) clear_rows(system, tree.nodes()[n], C);
 }
 
-void Covariances::recompute(const System& system, Tree& tree) {
+void Covariances::recompute(const System& system, const Tree& tree) {
   age_ = 0;
   std::ranges::fill(diagonal_, 0.0);
   diagonal_of_inverse(system, tree, [&](std::int32_t v, const double* block, std::int64_t stride) {
@@ -316,24 +322,25 @@ void Covariances::recompute(const System& system, Tree& tree) {
 }
 
 /// Σ_vv by solving along the path from v to its root.
-void Covariances::solve_for(const System& system, Tree& tree, std::int32_t v) {
+void Covariances::solve_for(const System& system, const Tree& tree, Substitution& substitution,
+                            std::int32_t v) {
   const std::int32_t size = system.size(v);
   AlignedVector& X = columns(system, 0);
   for (std::int32_t first = 0; first < size; first += 8) {
     const std::int32_t width = std::min(8, size - first);
     for (std::int32_t k = 0; k < width; ++k)
       X[static_cast<std::size_t>(system.offset(v) + first + k) * 8 + k] = 1.0;
-    tree.solve_many_above({&v, 1}, X);
+    substitution.solve_many_above(system, tree, {&v, 1}, X);
     for (std::int32_t k = 0; k < width; ++k) {
       for (std::int32_t r = 0; r < size; ++r)
         diagonal(v)[(first + k) * size + r] =
             X[static_cast<std::size_t>(system.offset(v) + r) * 8 + k];
     }
-    clear_path(system, tree, X);
+    clear_path(system, tree, substitution, X);
   }
 }
 
-void Covariances::solve_crosses(const System& system, Tree& tree,
+void Covariances::solve_crosses(const System& system, const Tree& tree, Substitution& substitution,
                                 std::span<const std::uint8_t> held) {
   AlignedVector& X = columns(system, 0);
   for (auto& [pair, block] : crosses_) {
@@ -346,12 +353,12 @@ void Covariances::solve_crosses(const System& system, Tree& tree,
       for (std::int32_t k = 0; k < width; ++k)
         X[static_cast<std::size_t>(system.offset(b) + first + k) * 8 + k] = 1.0;
       const std::int32_t both[2] = {a, b};
-      tree.solve_many_above(both, X);
+      substitution.solve_many_above(system, tree, both, X);
       for (std::int32_t k = 0; k < width; ++k) {
         for (std::int32_t r = 0; r < rows; ++r)
           block[(first + k) * rows + r] = X[static_cast<std::size_t>(system.offset(a) + r) * 8 + k];
       }
-      clear_path(system, tree, X);
+      clear_path(system, tree, substitution, X);
     }
   }
 }

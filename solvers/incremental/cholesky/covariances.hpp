@@ -10,6 +10,7 @@
 #include "cairn/runtime/aligned.hpp"
 #include "cairn/solve/estimator.hpp"
 #include "models.hpp"
+#include "substitution.hpp"
 #include "system.hpp"
 #include "tree.hpp"
 
@@ -57,20 +58,25 @@ class Covariances {
   bool keeps_anything() const { return kept_ != KeptMarginals::none || !crosses_.empty(); }
 
   /// Updates everything from the tree.
-  MarginalsBy update(const System& system, Tree& tree, std::span<const std::uint8_t> held);
+  MarginalsBy update(const System& system, const Tree& tree, Substitution& substitution,
+                     std::span<const std::uint8_t> held);
   /// A kept block, size_a × size_b, column-major; null if it is not kept.
   const double* kept(std::int32_t a, std::int32_t b) const;
   std::int64_t doubles() const;
 
  private:
-  bool downdate(const System& system, Tree& tree, std::span<const std::uint8_t> held);
+  bool downdate(const System& system, const Tree& tree, Substitution& substitution,
+                std::span<const std::uint8_t> held);
   bool take_out_fresh(const System& system, const Tree& tree);
-  bool scale_rows(const System& system, const Tree& tree);
+  bool scale_rows(const System& system, const Tree& tree, const Substitution& substitution);
   template <int width>
-  void apply(const System& system, Tree& tree, AlignedVector& C, const double* signs);
-  void recompute(const System& system, Tree& tree);
-  void solve_for(const System& system, Tree& tree, std::int32_t v);
-  void solve_crosses(const System& system, Tree& tree, std::span<const std::uint8_t> held);
+  void apply(const System& system, const Tree& tree, Substitution& substitution, AlignedVector& C,
+             const double* signs);
+  void recompute(const System& system, const Tree& tree);
+  void solve_for(const System& system, const Tree& tree, Substitution& substitution,
+                 std::int32_t v);
+  void solve_crosses(const System& system, const Tree& tree, Substitution& substitution,
+                     std::span<const std::uint8_t> held);
   double* diagonal(std::int32_t v) { return diagonal_.data() + place_[v]; }
   AlignedVector& columns(const System& system, std::size_t group);
 

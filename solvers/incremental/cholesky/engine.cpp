@@ -30,13 +30,9 @@ const block::Kernels& kernels_named(const std::string& name) {
 }  // namespace
 
 Engine::Engine(const Settings& settings, std::shared_ptr<Rescuer> rescuer)
-    : EngineState(settings, std::move(rescuer), kernels_named(settings.kernels)),
-      tree_(system_, states_, bound_, *kernels_) {}
+    : EngineState(settings, std::move(rescuer), kernels_named(settings.kernels)) {}
 
-Engine::Engine(const Engine& other)
-    : EngineState(other),
-      graph_(other.graph_.clone()),
-      tree_(other.tree_, system_, states_, bound_) {}
+Engine::Engine(const Engine& other) : EngineState(other), graph_(other.graph_.clone()) {}
 
 double Engine::rounding() {
   if (std::exchange(rounding_is_old_, false)) {
@@ -49,9 +45,9 @@ double Engine::rounding() {
 
 /// The estimate from before this update; everything is then to be linearised anew.
 void Engine::step_back() {
-  tree_.drop_deferred();
+  substitution_.drop_deferred(tree_);
   states_.undo(
-      [&](std::int32_t node, std::span<const double> lead) { tree_.undo_lead(node, lead); });
+      [&](std::int32_t node, std::span<const double> lead) { motions_.undo(tree_, node, lead); });
 }
 
 /// Starts anew at the current estimate with an optimizer that never raises chi2.
@@ -179,7 +175,7 @@ std::vector<double> Engine::x(int v) const {
   std::vector<double> x(static_cast<std::size_t>(states_.ambient(v)));
   if (shown_) {
     std::copy_n(shown_->x(v), x.size(), x.begin());
-  } else if (!tree_.read(v, x.data())) {
+  } else if (!motions_.read(tree_, states_, v, x.data())) {
     std::copy_n(states_.x(v), x.size(), x.begin());
   }
   return x;
@@ -206,7 +202,7 @@ Values Engine::values_of(const Estimate& estimate) const {
 }
 
 void Engine::write_back() {
-  tree_.settle_all();
+  motions_.settle_all(tree_, states_);
   graph_.set_values(values_of(states_.estimate()));
 }
 

@@ -17,12 +17,15 @@
 #include "cairn/solve/optimizer.hpp"
 #include "cairn/update/elimination.hpp"
 #include "covariances.hpp"
+#include "factorization.hpp"
 #include "gauge_watch.hpp"
 #include "job.hpp"
 #include "models.hpp"
+#include "motions.hpp"
 #include "pace.hpp"
 #include "revisits.hpp"
 #include "states.hpp"
+#include "substitution.hpp"
 #include "system.hpp"
 #include "tree.hpp"
 
@@ -66,28 +69,31 @@ struct Follower {
 struct EngineState {
   EngineState(const Settings& settings, std::shared_ptr<Rescuer> rescuer,
               const block::Kernels& kernels)
-      : settings_(settings), rescuer_(std::move(rescuer)), kernels_(&kernels) {}
+      : settings_(settings), rescuer_(std::move(rescuer)), kernels_(&kernels), tree_(kernels) {}
 
   Settings settings_;
   std::shared_ptr<Rescuer> rescuer_;
   const block::Kernels* kernels_;
   System system_;
   States states_;
+  Tree tree_;
+  Factorization factorization_;
+  Substitution substitution_;
+  Motions motions_;
   Models models_;
   GaugeWatch gauge_;
   Covariances covariances_;
   std::vector<std::uint8_t> held_;
   std::vector<std::uint8_t> live_variable_, live_factor_;
   std::vector<std::vector<std::int32_t>> factors_of_;
-  std::vector<std::int32_t> bound_;       // by variable: see Tree
   std::vector<std::int64_t> touched_at_;  // by variable: update
   Revisits revisits_;
-  std::vector<Tree::Expected> expected_;  // soon
-  std::int64_t prepared_ = 0;             // variables so far
+  std::vector<Expected> expected_;  // soon
+  std::int64_t prepared_ = 0;       // variables so far
   std::vector<std::int32_t>
       touched_;  // variables whose part of H has changed since the last solution
   std::vector<std::int32_t> sources_;  // … or of the right-hand side alone
-  std::vector<double> steps_;          // by scalars; zero between calls
+  Steps steps_;                        // none between calls
   std::vector<std::int32_t>
       moved_;  // variables that steps have moved since factors were last evaluated
   std::vector<std::uint8_t> has_moved_;  // by variable: whether it is one of them
@@ -127,7 +133,6 @@ struct EngineState {
   std::vector<double> gradients_;       // g of `sources_` after the last evaluation, as in `System`
   std::vector<std::int32_t> looked_;    // factors of the last evaluation
   std::vector<std::int32_t> together_;  // those of them that are evaluated at a time
-  std::vector<std::int32_t> changed_;   // by the last substitution
   double looked_at_ = 0.0;              // what steps had gained before the last evaluation
   double mismatch_ = 0.0;   // of factors on several variables that are not relative, then
   double shortfall_ = 0.0;  // by how much more than expected the cost was then
@@ -150,7 +155,7 @@ class Engine : private EngineState {
   /// x_v at the current estimate, ambient_size doubles. Changes nothing.
   std::vector<double> x(int v) const;
   /// All states at the current estimate. Changes nothing.
-  Estimate current() const { return shown_ ? *shown_ : tree_.settled(); }
+  Estimate current() const { return shown_ ? *shown_ : settled(tree_, states_); }
   /// The factor's number in the graph, or -1.
   std::int32_t place_of(FactorId id) const {
     const auto found = std::ranges::lower_bound(ids_, id);
@@ -239,7 +244,9 @@ class Engine : private EngineState {
 
   /// Which covariances are to be kept up to date; by `update_covariances`, after solving.
   Covariances& covariances() { return covariances_; }
-  MarginalsBy update_covariances() { return covariances_.update(system_, tree_, held_); }
+  MarginalsBy update_covariances() {
+    return covariances_.update(system_, tree_, substitution_, held_);
+  }
   /// Σ_ab of steps as seen from the poses (x ⊕ δ), size_a × size_b, column-major: a kept block or
   /// by solving. False if H is singular, if only to rounding.
   bool covariance(int a, int b, double* block);
@@ -270,10 +277,10 @@ class Engine : private EngineState {
   void relinearize_all();
   void touch(std::int32_t v);
   void follow(std::int32_t v);
+  void settle(std::int32_t v) { motions_.settle(tree_, states_, v); }
   void apply_steps();
-  void forget_steps();
   void move_states(std::span<const std::int32_t> variables);
-  void turn_models(const Tree::Turn& turn);
+  void turn_models(const Motions::Turn& turn);
   void collect_moved_factors();
   void count_bonds(int f, std::int32_t sign);
   void admit();
@@ -339,7 +346,6 @@ class Engine : private EngineState {
   std::vector<std::int32_t> disconnected_;  // some may have new factors since, or be gone
 
   Graph graph_;
-  Tree tree_;  // refers to the state
 };
 
 }  // namespace cairn::incremental

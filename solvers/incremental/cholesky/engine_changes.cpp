@@ -33,22 +33,23 @@ void Engine::load(Graph graph, std::vector<FactorId> ids) {
   system_ = System();
   states_ = States();
   models_.clear();
-  tree_ = Tree(system_, states_, bound_, *kernels_);
+  tree_ = Tree(*kernels_);
+  factorization_ = {};
+  substitution_ = {};
+  motions_ = {};
   gauge_ = GaugeWatch();
   held_.clear();
   live_variable_.clear();
   live_factor_.clear();
   factors_of_.clear();
-  bound_.clear();
   touched_.clear();
   sources_.clear();
   is_source_.clear();
-  steps_.clear();
+  steps_ = {};
   moved_.clear();
   has_moved_.clear();
   retiring_.clear();
   looked_.clear();
-  changed_.clear();
   followers_.clear();
   job_ = {};
   shown_.reset();
@@ -75,16 +76,16 @@ void Engine::added_variable() {
   const int v = states_.size();
   const VariableType& type = graph_.type(v);
   system_.add_variable(type.tangent_size());
+  tree_.add_variable();
   states_.add(graph_.type_of(v), graph_.state(v));
   if (shown_) shown_->add(graph_.state(v));
-  steps_.resize(static_cast<std::size_t>(system_.scalars()), 0.0);
+  steps_.values.resize(static_cast<std::size_t>(system_.scalars()), 0.0);
   gauge_.add_variable(type.tangent_size(), type.lie_group() != nullptr, graph_.fixed(v));
   held_.push_back(1);  // until it has a factor
   covariances_.note_variable(v);
   live_variable_.push_back(1);
   factors_of_.emplace_back();
   touched_at_.push_back(time_);
-  bound_.push_back(0);
   has_moved_.push_back(0);
   is_source_.push_back(0);
 }
@@ -329,7 +330,7 @@ void Engine::count_bonds(int f, std::int32_t sign) {
   if (binds && variables.size() > 1) others_ += sign;
   for (const std::int32_t v : variables) binds = binds || held_[v];
   if (!binds) return;
-  for (const std::int32_t v : variables) bound_[v] += sign;
+  for (const std::int32_t v : variables) tree_.bind(v, sign);
 }
 
 void Engine::take_out(int f) {
@@ -374,36 +375,30 @@ void Engine::relinearize(int f) {
 
 /// Whoever changes the factors of a variable must have followed first.
 void Engine::follow(std::int32_t v) {
-  tree_.follow(v, steps_, changed_);
-  if (!changed_.empty()) apply_steps();
+  substitution_.follow(system_, tree_, states_, motions_, v, steps_);
+  if (!steps_.changed.empty()) apply_steps();
 }
 
-/// Moves the estimate by the steps of `changed_`.
+/// Moves the estimate by `steps_`.
 void Engine::apply_steps() {
-  move_states(changed_);
-  forget_steps();
+  move_states(steps_.changed);
+  steps_.clear(system_);
 }
 
 void Engine::move_states(std::span<const std::int32_t> variables) {
   for (const std::int32_t v : variables) {
-    if (held_[v]) std::fill_n(steps_.data() + system_.offset(v), system_.size(v), 0.0);
+    if (held_[v]) std::fill_n(steps_.values.data() + system_.offset(v), system_.size(v), 0.0);
     if (!std::exchange(has_moved_[v], 1)) moved_.push_back(v);
   }
-  states_.move(variables, steps_.data());
-}
-
-void Engine::forget_steps() {
-  for (const std::int32_t v : changed_)
-    std::fill_n(steps_.data() + system_.offset(v), system_.size(v), 0.0);
-  changed_.clear();
+  states_.move(variables, steps_.values.data());
 }
 
 /// For the factors that join its variable with the subtree.
-void Engine::turn_models(const Tree::Turn& turn) {
+void Engine::turn_models(const Motions::Turn& turn) {
   for (const std::int32_t f : factors_of_[turn.variable]) {
     const auto below = [&](std::int32_t v) { return tree_.below(v, turn.node); };
     if (std::ranges::any_of(models_.variables(f), below))
-      models_.move(f, turn.variable, tree_.turned_steps().data() + turn.step);
+      models_.move(f, turn.variable, motions_.turned_steps().data() + turn.step);
   }
 }
 

@@ -58,7 +58,7 @@ class Engine::Turn {
   bool find(int v) {
     size_ = engine_.system_.size(v);
     x_.resize(static_cast<std::size_t>(engine_.states_.ambient(v)));
-    if (!engine_.tree_.read(v, x_.data())) {
+    if (!engine_.motions_.read(engine_.tree_, engine_.states_, v, x_.data())) {
       if (!engine_.states_.away(v)) return false;
       std::copy_n(engine_.states_.x(v), x_.size(), x_.begin());
     }
@@ -133,9 +133,9 @@ bool Engine::covariance_column(std::span<const std::int32_t> rows, int b, double
     for (std::int32_t k = 0; k < width; ++k)
       X[static_cast<std::size_t>(system_.offset(b) + first + k) * 8 + k] = 1.0;
     if (few) {
-      tree_.solve_many_above(sources, X);
+      substitution_.solve_many_above(system_, tree_, sources, X);
     } else {
-      tree_.solve_many(sources, X);
+      substitution_.solve_many(system_, tree_, sources, X);
     }
     const double* own = X.data() + static_cast<std::size_t>(system_.offset(b) + first) * 8;
     if (!have_digits(b, first, width, own, 8 + 1)) return false;

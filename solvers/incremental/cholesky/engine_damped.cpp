@@ -96,7 +96,7 @@ void Engine::not_positive_definite(UpdateReport& report) {
   }
   damp_more();
   if (job_.damped == Job::Damped::last && !job_.converged) job_.lambda = 0.0;
-  tree_.begin_factorization(job_.lambda);
+  factorization_.begin(tree_, job_.lambda);
   job_.go_to(Job::Stage::factorize);
 }
 

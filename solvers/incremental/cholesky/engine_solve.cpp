@@ -120,26 +120,27 @@ bool Engine::advance(UpdateReport& report) {
       const Timed timed(seconds.solve);
       if (!set_right_hand_side_more()) return false;
       for (const std::int32_t v : sources_) system_.mark_solved(v);
-      tree_.begin_climb(sources_);
+      substitution_.begin_climb(tree_, sources_);
       job_.go_to(climb);
       break;
     }
     case climb: {
       const Timed timed(seconds.solve);
-      if (!tree_.climb(system_.g(), pace_)) return false;
-      decrease_ = tree_.climbed();
+      if (!substitution_.climb(system_, tree_, pace_)) return false;
+      decrease_ = substitution_.climbed();
       gained_ += decrease_;
       for (const std::int32_t v : sources_) is_source_[v] = 0;
       sources_.clear();
       job_.unproven = true;
       if (!shown_) pace_.keep_free(kCopySeconds * states_.size());
-      tree_.begin_descent();
+      substitution_.begin_descent(tree_, motions_);
       job_.go_to(descend);
       break;
     }
     case descend: {
       const Timed timed(seconds.solve);
-      if (!tree_.descend(job_.tolerance, system_.g(), steps_, changed_, pace_)) return false;
+      if (!substitution_.descend(system_, tree_, states_, motions_, job_.tolerance, steps_, pace_))
+        return false;
       job_.go_to(move_states);
       break;
     }
@@ -166,14 +167,14 @@ bool Engine::advance(UpdateReport& report) {
       gradients_.resize(system_.g().size());
       for (const std::int32_t v : sources_)
         std::copy_n(system_.g(v), system_.size(v), gradients_.data() + system_.offset(v));
-      tree_.begin_climb(sources_);
+      substitution_.begin_climb(tree_, sources_);
       job_.go_to(decrement);
       break;
     }
     case decrement: {
       const Timed timed(seconds.solve);
-      if (!tree_.climb(system_.g(), pace_)) return false;
-      tree_.end_decrement(system_.g());
+      if (!substitution_.climb(system_, tree_, pace_)) return false;
+      substitution_.end_decrement(system_, tree_);
       improve(report);
       break;
     }
@@ -212,7 +213,7 @@ bool Engine::order_affected(UpdateReport& report) {
   if (structure_changed_) {
     prepare_for_revisits();
     if (!pace_.allows(Work::order, tree_.affected_variables())) return false;
-    tree_.restructure(touched_at_, time_ - settings_.recent, expected_);
+    tree_.restructure(system_, {touched_at_, time_ - settings_.recent, expected_});
     states_.remember();  // nodes keep their numbers from here on
   }
   retiring_.clear();
@@ -221,7 +222,7 @@ bool Engine::order_affected(UpdateReport& report) {
   for (const std::int32_t v : touched_) add_source(v);
   touched_.clear();
   if (job_.damped == Job::Damped::no) job_.before = cost();
-  tree_.begin_factorization(job_.damped == Job::Damped::no ? 0.0 : job_.lambda);
+  factorization_.begin(tree_, job_.damped == Job::Damped::no ? 0.0 : job_.lambda);
   job_.go_to(Job::Stage::factorize);
   return true;
 }
@@ -260,10 +261,10 @@ bool Engine::factorize_more(UpdateReport& report) {
   std::int32_t result = 0;
   {
     const Timed timed(report.seconds.factorize);
-    result = tree_.factorize_more(pace_);
+    result = factorization_.more(system_, tree_, pace_);
   }
-  if (result == Tree::kPaused) return false;
-  if (result < 0) {
+  if (result == Factorization::kPaused) return false;
+  if (result == Factorization::kDone) {
     factorized(report);
   } else {
     not_positive_definite(report);
@@ -297,10 +298,10 @@ void Engine::factorized(UpdateReport& report) {
 /// Whether what has not been solved for yet would lower chi2 by nothing that matters.
 bool Engine::negligible() {
   for (const std::int32_t v : sources_) {
-    tree_.settle(v);
+    settle(v);
     models_.right_hand_side(system_, states_, v);
   }
-  const double gain = tree_.decrement(sources_, system_.g());
+  const double gain = substitution_.decrement(system_, tree_, sources_);
   return gain <= std::min(settings_.significance, kEnough * settings_.accuracy * cost());
 }
 
@@ -313,7 +314,7 @@ bool Engine::set_right_hand_side_more() {
   for (; job_.next < sources_.size(); ++job_.next) {
     if (!pace_.allows(Work::move, 1.0)) return false;
     const std::int32_t v = sources_[job_.next];
-    tree_.settle(v);
+    settle(v);
     models_.right_hand_side(system_, states_, v);
   }
   return true;
@@ -330,20 +331,20 @@ void Engine::touch_all() {
 /// Moves the estimate by the step.
 bool Engine::move_more() {
   if (job_.stage == Job::Stage::move_states) {
-    while (job_.next < changed_.size()) {
-      const std::size_t count = std::min(changed_.size() - job_.next, kAtOnce);
+    while (job_.next < steps_.changed.size()) {
+      const std::size_t count = std::min(steps_.changed.size() - job_.next, kAtOnce);
       if (!pace_.allows(Work::move, static_cast<double>(count))) return false;
-      move_states(std::span(changed_).subspan(job_.next, count));
+      move_states(std::span(steps_.changed).subspan(job_.next, count));
       job_.next += count;
     }
     job_.go_to(Job::Stage::turn_models);
   }
-  for (const auto turns = tree_.turns(); job_.next < turns.size(); ++job_.next) {
+  for (const auto turns = motions_.turns(); job_.next < turns.size(); ++job_.next) {
     const auto factors = factors_of_[turns[job_.next].variable].size();
     if (!pace_.allows(Work::move, static_cast<double>(factors))) return false;
     turn_models(turns[job_.next]);
   }
-  forget_steps();
+  steps_.clear(system_);
   return true;
 }
 
@@ -390,7 +391,7 @@ void Engine::evaluate(std::span<const std::int32_t> factors) {
   for (const std::int32_t f : factors) {
     for (const std::int32_t v : models_.variables(f)) {
       if (is_source_[v]) continue;
-      tree_.settle(v);
+      settle(v);
       add_source(v);
     }
     before += models_.cost(f);
@@ -431,7 +432,8 @@ void Engine::prove() {
 /// it is; if the former is much larger, H is not that of the current estimate, and what has moved
 /// is relinearised.
 void Engine::improve(UpdateReport& report) {
-  const double left = std::min(tree_.climbed(), cost_);  // more is rounding: chi2 is not negative
+  const double left =
+      std::min(substitution_.climbed(), cost_);  // more is rounding: chi2 is not negative
   const double allowed = settings_.accuracy * cost_ + rounding();
   report.owed = 0;
   const bool poses_alone = others_ == 0 && live_factors_ > kFew;
@@ -509,7 +511,7 @@ bool Engine::bring_factor_up_to_date(UpdateReport& report) {
   order_affected(report);
   job_ = {};
   const Timed timed(report.seconds.factorize);
-  return tree_.factorize_more(pace_) < 0;
+  return factorization_.more(system_, tree_, pace_) == Factorization::kDone;
 }
 
 }  // namespace cairn::incremental

@@ -34,7 +34,7 @@ bool Engine::follows(std::int32_t v) const {
 void Engine::place_followers() {
   for (const Follower& one : followers_) {
     const LieGroup& group = *states_.type(one.variable).lie_group();
-    tree_.settle(one.leader);
+    settle(one.leader);
     std::vector<double> motion(one.relative.size());
     group.inverse(states_.x(one.variable), motion.data());
     group.compose(one.relative.data(), motion.data(), motion.data());
@@ -58,11 +58,11 @@ bool Engine::admit_waiting() {
 /// Keeps the estimate from before a step that has not been evaluated.
 void Engine::show_what_is_proven() {
   if (!job_.unproven || shown_) return;
-  Tree::Leads leads;
+  Leads leads;
   Estimate before = states_.before([&](std::int32_t node, std::span<const double> lead) {
     leads[node].assign(lead.begin(), lead.end());
   });
-  shown_ = tree_.settled(std::move(before), leads);
+  shown_ = settled(tree_, states_, std::move(before), leads);
 }
 
 }  // namespace cairn::incremental

@@ -7,83 +7,27 @@
 #include <utility>
 
 #include "block/front.hpp"
-#include "block/schedule.hpp"
 
 namespace cairn::incremental {
 namespace {
 
 constexpr block::CostModel kCost;
-/// What a piece of a front is to take at most [ns by `kCost`].
-constexpr double kPiece = 2e5;
-/// Rows are divided at multiples of so many, the height of the kernels' tiles.
-constexpr std::int64_t kRows = 24;
 
-std::int32_t round_up(std::int32_t rows) { return (rows + 7) / 8 * 8; }
+std::int32_t round_up(std::int32_t value) { return (value + 7) / 8 * 8; }
+
+/// Sets the size without keeping what was there. Small arrays get a little more than they need, so
+/// that the next node of that place need not ask for memory.
+void make_room(UninitializedVector& buffer, std::int64_t doubles) {
+  constexpr std::size_t kLittle = 64;
+  const std::size_t size = static_cast<std::size_t>(doubles);
+  if (buffer.capacity() < size || buffer.capacity() > 2 * size + 4 * kLittle) {
+    buffer = UninitializedVector();
+    buffer.reserve(size < 16 * kLittle ? size + kLittle : size);
+  }
+  buffer.resize(size);
+}
 
 }  // namespace
-
-/// How the work on one front is divided where the time is limited, and what the pieces take [ns by
-/// `kCost`]. A front that is not large, or whose time is not limited, is one piece.
-class Tree::FrontPieces {
- public:
-  FrontPieces(const Node& node, Pace& pace)
-      : node_(node), pace_(pace), in_pieces_(block::is_large(node.m) && pace.limited()) {}
-  bool in_pieces() const { return in_pieces_; }
-  bool allows(double nanoseconds) const {
-    return !in_pieces_ || pace_.allows(Work::factorize, nanoseconds);
-  }
-
-  /// Where a piece of so many doubles ends that begins at `next`.
-  std::int64_t end_of_doubles(std::int64_t next, std::int64_t all) const {
-    return in_pieces_ ? std::min(all, next + block::kTileZeroed) : all;
-  }
-  /// Columns of a child's update matrix.
-  double of_child(const Node& child, std::int64_t columns) const {
-    return kCost.extend_entry * static_cast<double>(columns) * child.below();
-  }
-  std::int64_t end_of_child(const Node& child, std::int64_t column, std::int64_t last) const {
-    if (!in_pieces_) return last;
-    const auto columns = static_cast<std::int64_t>(kPiece / of_child(child, 1));
-    return std::min(last, column + std::max<std::int64_t>(8, columns));
-  }
-  /// Rows of the columns [first, last), those before being done.
-  double of_rows(int first, int last, std::int64_t rows) const {
-    return kCost.panel_flop * static_cast<double>(rows) * (last - first) * (first + last);
-  }
-  std::int64_t end_of_rows(int first, int last, std::int64_t row) const {
-    return end_of(row, [&](std::int64_t end) { return of_rows(first, last, end - row); });
-  }
-  /// Rows [begin, end) of the update matrix's lower triangle, counted in the front.
-  double of_update(std::int64_t begin, std::int64_t end) const {
-    const double width = 0.5 * static_cast<double>(begin + end) - node_.columns + 8.0;
-    return kCost.update_flop * 2.0 * node_.columns * width * static_cast<double>(end - begin);
-  }
-  std::int64_t end_of_update(std::int64_t row) const {
-    return end_of(row, [&](std::int64_t end) { return of_update(row, end); });
-  }
-
- private:
-  /// `time` is that of the rows from `row` up to some other one.
-  template <class Time>
-  std::int64_t end_of(std::int64_t row, Time time) const {
-    if (!in_pieces_) return node_.stride;
-    std::int64_t end = row + kRows;
-    while (end < node_.stride && time(end + kRows) <= kPiece) end += kRows;
-    return std::min<std::int64_t>(node_.stride, end);
-  }
-
-  const Node& node_;
-  Pace& pace_;
-  bool in_pieces_;
-};
-
-Tree::Tree(const Tree& other, const System& system, States& states,
-           const std::vector<std::int32_t>& bound)
-    : Tree(other) {
-  system_ = &system;
-  states_ = &states;
-  bound_ = &bound;
-}
 
 // --- the affected part ---
 
@@ -91,29 +35,19 @@ void Tree::clear_affected() {
   for (const std::int32_t n : affected_) nodes_[n].affected = false;
   affected_.clear();
   affected_variables_ = 0;
-  for (const std::int32_t v : fresh_) is_fresh_[v] = 0;
+  for (const std::int32_t v : fresh_) variables_[v].fresh = false;
   fresh_.clear();
 }
 
-void Tree::make_room_for_variables() {
-  const std::size_t size = static_cast<std::size_t>(system_->variables());
-  if (node_of_.size() >= size) return;
-  node_of_.resize(size, -1);
-  is_fresh_.resize(size, 0);
-  retired_.resize(size, 0);
-  local_.resize(size, -1);
-  front_row_.resize(size, -1);
-}
-
 void Tree::touch(std::int32_t variable) {
-  make_room_for_variables();
-  retired_[variable] = 0;
-  if (node_of_[variable] < 0) {
-    if (!is_fresh_[variable]) fresh_.push_back(variable);
-    is_fresh_[variable] = 1;
+  Variable& touched = variables_[variable];
+  touched.retired = false;
+  if (touched.node < 0) {
+    if (!touched.fresh) fresh_.push_back(variable);
+    touched.fresh = true;
     return;
   }
-  for (std::int32_t n = node_of_[variable]; n >= 0 && !nodes_[n].affected; n = nodes_[n].parent) {
+  for (std::int32_t n = touched.node; n >= 0 && !nodes_[n].affected; n = nodes_[n].parent) {
     nodes_[n].affected = true;
     affected_.push_back(n);
     affected_variables_ += nodes_[n].own;
@@ -121,274 +55,213 @@ void Tree::touch(std::int32_t variable) {
 }
 
 void Tree::retire(std::int32_t variable) {
-  make_room_for_variables();
-  assert(node_of_[variable] < 0 || nodes_[node_of_[variable]].affected);
-  retired_[variable] = 1;
+  Variable& leaving = variables_[variable];
+  assert(leaving.node < 0 || nodes_[leaving.node].affected);
+  leaving.retired = true;
 }
 
-// --- numbers ---
-
-void Tree::begin_factorization(double damping) {
+void Tree::put_affected_children_first() {
   std::ranges::sort(affected_, {}, [&](std::int32_t n) { return nodes_[n].sequence; });
-  factorized_ = 0;
-  progress_ = {};
-  damping_ = damping;
 }
 
-std::int32_t Tree::factorize_more(Pace& pace) {
-  for (; factorized_ < affected_.size(); ++factorized_, progress_ = {}) {
-    Node& node = nodes_[affected_[factorized_]];
-    if (!factorize_node(node, pace)) return kPaused;
-    if (progress_.failed < 0) continue;
-    for (const std::int32_t v : node.own_variables()) {
-      const std::int32_t row = front_row(node, v);
-      for (std::int32_t c = row; c < row + system_->size(v); ++c) {
-        const double pivot = node.panel[std::int64_t{c} * node.stride + c];
-        if (!(pivot > 0.0) || !std::isfinite(pivot)) return v;
-      }
-    }
-    return node.variables.front();
-  }
-  return -1;
+double Tree::affected_cost() const {
+  double sum = 0.0;
+  for (const std::int32_t n : affected_) sum += kCost.time(nodes_[n].columns, nodes_[n].below());
+  return sum;
 }
 
-/// H's entries into the panel, which is zero before. From here on `front_row_` is that of the node.
-void Tree::assemble(Node& node) {
-  double* panel = node.panel.data();
-  const std::int64_t stride = node.stride;
-  std::int32_t row = 0;
-  for (const std::int32_t v : node.variables) {
-    front_row_[v] = row;
-    row += system_->size(v);
-  }
-  for (const std::int32_t v : node.own_variables()) {
-    const std::int32_t size = system_->size(v), at = front_row_[v];
-    double* columns = panel + at * stride;
-    const double* diagonal = system_->diagonal(v);
-    for (std::int32_t c = 0; c < size; ++c) {
-      for (std::int32_t r = 0; r < size; ++r) columns[c * stride + at + r] = *diagonal++;
-      columns[c * stride + at + c] *= 1.0 + damping_;
+double Tree::cost_to_touch(std::int32_t variable, double limit) const {
+  double sum = 0.0;
+  for (std::int32_t n = node_of(variable); n >= 0 && !nodes_[n].affected && sum <= limit;
+       n = nodes_[n].parent)
+    sum += kCost.time(nodes_[n].columns, nodes_[n].below());
+  return sum;
+}
+
+double Tree::seconds_to_order_anew() const {
+  return 1e-9 * (2.0 * now_.cost + 1500.0 * static_cast<double>(now_.variables));
+}
+
+bool Tree::worn_out() const {
+  const double growth =
+      std::max(1.0, static_cast<double>(now_.variables) / std::max(when_ordered_.variables, 100));
+  return now_.cost > 1.5 * growth * std::max(when_ordered_.cost, 1e5);
+}
+
+// --- which variables make up which node ---
+
+void Tree::restructure(const System& system, const Recency& recency) {
+  const auto [members, orphans] = take_down();
+  std::vector<std::span<const std::int32_t>> cliques;
+  cliques.reserve(orphans.size());
+  for (const std::int32_t o : orphans) cliques.push_back(nodes_[o].separator());
+  reordering_.compute(system, members, cliques, recency);
+  put_up(system, orphans);
+  if (orphans.empty()) when_ordered_ = now_;
+}
+
+/// The affected nodes go.
+Tree::Detached Tree::take_down() {
+  Detached detached;
+  auto& [members, orphans] = detached;
+  for (const std::int32_t n : affected_) {
+    unsettled_ += nodes_[n].owes || !nodes_[n].lead.empty();
+    const auto own = nodes_[n].own_variables();
+    members.insert(members.end(), own.begin(), own.end());
+    for (const std::int32_t c : nodes_[n].children) {
+      if (!nodes_[c].affected) orphans.push_back(c);
     }
-    for (const System::Link& link : system_->links(v)) {
-      const std::int32_t other = front_row_[link.other];
-      if (other < at) continue;  // in a subtree, or done from the other side
-      const std::int32_t rows = system_->size(link.other);
-      const double* block = system_->block(link.entry);
-      if (link.other < v) {
-        for (std::int32_t c = 0; c < size; ++c) {
-          for (std::int32_t r = 0; r < rows; ++r) columns[c * stride + other + r] = *block++;
-        }
+  }
+  for (const std::int32_t n : affected_) free_node(n);
+  affected_.clear();
+  members.insert(members.end(), fresh_.begin(), fresh_.end());
+  for (const std::int32_t v : members) variables_[v].node = -1, variables_[v].fresh = false;
+  fresh_.clear();
+  std::erase_if(members, [&](std::int32_t v) { return variables_[v].retired; });
+  std::ranges::sort(members);
+  return detached;
+}
+
+/// Makes the nodes, children before their parents.
+void Tree::put_up(const System& system, std::span<const std::int32_t> orphans) {
+  const std::span<const std::int32_t> order = reordering_.order();
+  const std::int32_t n = static_cast<std::int32_t>(order.size());
+  std::vector<std::int32_t> node_at(order.size(), -1);  // by top
+  for (std::int32_t k = 0; k < n; ++k) {
+    const std::int32_t top = reordering_.top_of(k);
+    if (node_at[top] < 0) node_at[top] = new_node();
+    nodes_[node_at[top]].variables.push_back(order[k]);
+    variables_[order[k]].node = node_at[top];
+  }
+  affected_variables_ = n;
+  for (std::int32_t k = 0; k < n; ++k) {
+    if (reordering_.top_of(k) != k) continue;
+    Node& node = nodes_[node_at[k]];
+    node.own = static_cast<std::int32_t>(node.variables.size());
+    for (const std::int32_t row : reordering_.rows(k)) node.variables.push_back(order[row]);
+    node.sequence = next_sequence_++;
+    node.affected = true;
+    affected_.push_back(node_at[k]);
+    if (const std::int32_t parent = reordering_.parent(k); parent >= 0) {
+      node.parent = node_at[reordering_.top_of(parent)];
+      nodes_[node.parent].children.push_back(node_at[k]);
+    }
+    lay_out(system, node);
+    now_.cost += kCost.time(node.columns, node.below());
+    now_.variables += node.own;
+  }
+  for (std::int32_t k = 0; k < n; ++k) {
+    reordering_.for_each_clique(k, [&](std::int32_t o) {
+      const std::int32_t parent = node_at[reordering_.top_of(k)];
+      nodes_[orphans[o]].parent = parent;
+      nodes_[parent].children.push_back(orphans[o]);
+    });
+  }
+  for (const std::int32_t a : affected_) {
+    Node& node = nodes_[a];
+    connect_children(system, node);
+    node.movable =
+        std::ranges::all_of(node.own_variables(),
+                            [&](std::int32_t v) { return variables_[v].bound == 0; }) &&
+        std::ranges::all_of(node.children, [&](std::int32_t c) { return nodes_[c].movable; });
+  }
+}
+
+std::int32_t Tree::new_node() {
+  std::int32_t n;
+  if (free_.empty()) {
+    n = static_cast<std::int32_t>(nodes_.size());
+    nodes_.emplace_back();
+  } else {
+    n = free_.back();
+    free_.pop_back();
+  }
+  nodes_[n].live = true;
+  return n;
+}
+
+/// Its arrays keep their memory for the next one, but for the large ones, which count.
+void Tree::free_node(std::int32_t n) {
+  Node& node = nodes_[n];
+  doubles_ -= std::ssize(node.panel) + std::ssize(node.update);
+  now_.cost -= kCost.time(node.columns, node.below());
+  now_.variables -= node.own;
+  node.variables.clear();
+  node.children.clear();
+  node.owed.clear();
+  node.owes = false;
+  node.lead.clear();
+  node.own = 0;
+  node.parent = -1;
+  node.live = node.affected = false;
+  node.panel.resize(0);
+  node.update.resize(0);
+  free_.push_back(n);
+}
+
+void Tree::lay_out(const System& system, Node& node) {
+  node.columns = node.m = 0;
+  node.runs.clear();
+  for (std::size_t k = 0; k < node.variables.size(); ++k) {
+    const std::int32_t v = node.variables[k], size = system.size(v);
+    if (k < static_cast<std::size_t>(node.own)) {
+      node.columns += size;
+    } else {
+      const std::int32_t offset = static_cast<std::int32_t>(system.offset(v));
+      block::Run* last = node.runs.empty() ? nullptr : &node.runs.back();
+      if (last && last->source + last->length == offset) {
+        last->length += size;
       } else {
-        for (std::int32_t r = 0; r < rows; ++r) {
-          for (std::int32_t c = 0; c < size; ++c) columns[c * stride + other + r] = *block++;
-        }
+        node.runs.push_back({offset, node.m, size});
       }
     }
+    node.m += size;
   }
+  node.stride = round_up(node.m);
+  node.settled_at = -1;
+  node.owed.assign(static_cast<std::size_t>(node.below()), 0.0);
+  make_room(node.panel, std::int64_t{node.stride} * node.columns);
+  make_room(node.update, std::int64_t{node.below()} * node.update_stride());
+  doubles_ += std::ssize(node.panel) + std::ssize(node.update);
 }
 
-/// A child whose separator has another order than the front: block by block. Into the panel and
-/// what is there of the update matrix, which must have been computed.
-bool Tree::add_scattered(const Node& child, Node& parent, const FrontPieces& front) {
-  const std::int32_t shift = child.columns / 8 * 8;
-  // Element (row, column) of the parent's front, row ≥ column, is column_of(column)[row].
-  const auto column_of = [&](std::int32_t column) {
-    return column < parent.columns
-               ? parent.panel.data() + std::int64_t{column} * parent.stride
-               : parent.update.data() + parent.update_place(column, column) - column;
-  };
-  const auto separator = child.separator();
-  std::int64_t& next = progress_.end;  // of the separator: those before are done
-  std::int32_t j = 0;
-  for (std::int64_t b = 0; b < next; ++b) j += system_->size(separator[b]);
-  for (; next < std::ssize(separator); ++next) {
-    const std::size_t b = static_cast<std::size_t>(next);
-    const std::int32_t width = system_->size(separator[b]), to_j = front_row_[separator[b]];
-    if (!front.allows(front.of_child(child, width))) return false;
-    std::int32_t i = j;
-    for (std::size_t a = b; a < separator.size(); ++a) {
-      const std::int32_t height = system_->size(separator[a]), to_i = front_row_[separator[a]];
-      for (std::int32_t c = 0; c < width; ++c) {
-        const double* column = child.update.data() + std::int64_t{j + c} * child.update_stride() +
-                               (i + child.columns - shift);
-        if (to_i >= to_j) {
-          double* target = column_of(to_j + c) + to_i;
-          for (std::int32_t r = a == b ? c : 0; r < height; ++r) target[r] += column[r];
-        } else {
-          for (std::int32_t r = 0; r < height; ++r) column_of(to_i + r)[to_j + c] += column[r];
-        }
-      }
-      i += height;
-    }
-    j += width;
-  }
-  next = 0;
-  return true;
-}
-
-/// Sets all of an array to zero.
-bool Tree::fill_with_zeros(std::span<double> array, const FrontPieces& front) {
-  const std::int64_t all = std::ssize(array);
-  for (std::int64_t& next = progress_.next; next < all; next = progress_.end) {
-    progress_.end = front.end_of_doubles(next, all);
-    if (!front.allows(kCost.panel_entry * static_cast<double>(progress_.end - next))) return false;
-    std::fill(array.begin() + next, array.begin() + progress_.end, 0.0);
-  }
-  return true;
-}
-
-/// Adds columns [first, last) of the update matrix of a child that is `straight`, see `extend_add`.
-bool Tree::add_child(const Node& child, std::int32_t first, std::int32_t last, double* parent,
-                     std::int64_t parent_stride, const FrontPieces& front) {
-  std::int64_t& column = progress_.end;
-  column = std::max<std::int64_t>(column, first);
-  while (column < last) {
-    const std::int64_t end = front.end_of_child(child, column, last);
-    if (!front.allows(front.of_child(child, end - column))) return false;
-    kernels_->extend_add(child.spreads.data(), static_cast<int>(child.spreads.size()),
-                         static_cast<int>(column), static_cast<int>(end),
-                         child.update.data() + child.columns % 8, child.update_stride(), parent,
-                         parent_stride);
-    column = end;
-  }
-  column = 0;
-  return true;
-}
-
-/// Computes a node. Where its front is large and the time is limited, in pieces: false if there was
-/// no time for the next one, and then the next call goes on there. `progress_.failed` says whether
-/// there is a pivot that is not positive.
-bool Tree::factorize_node(Node& node, Pace& pace) {
-  using enum Progress::Part;
-  const FrontPieces front(node, pace);
-  if (!front.in_pieces() && !pace.allows(Work::factorize, kCost.time(node.columns, node.below())))
-    return false;
-  double* const panel = node.panel.data();
-  const bool inner = node.below() > 0;
-  const std::int64_t stride = node.stride;
-  std::int64_t& next = progress_.next;
-  switch (progress_.part) {
-    case zero:
-      if (!fill_with_zeros(node.panel, front)) return false;
-      progress_.go_to(assemble_H);
-      [[fallthrough]];
-    case assemble_H:
-      if (!front.allows(kCost.supernode * static_cast<double>(node.own))) return false;
-      assemble(node);
-      progress_.go_to(add_to_panel);
-      [[fallthrough]];
-    case add_to_panel:
-      // What comes from children goes into the panel here, into the update matrix at the end.
-      for (; next < std::ssize(node.children); ++next) {
-        const Node& child = nodes_[node.children[next]];
-        if (!child.straight) {
-          progress_.scattered = true;
-          continue;
-        }
-        if (!add_child(child, 0, child.panel_rows, panel, stride, front)) return false;
-      }
-      progress_.go_to(zero_update);
-      [[fallthrough]];
-    case zero_update:
-      if (progress_.scattered && inner && !fill_with_zeros(node.update, front)) return false;
-      progress_.go_to(add_scattered_ones);
-      [[fallthrough]];
-    case add_scattered_ones:
-      // Panel and update matrix at once: the latter into zeros, to be added after the product.
-      for (; progress_.scattered && next < std::ssize(node.children); ++next) {
-        const Node& child = nodes_[node.children[next]];
-        if (!child.straight && !add_scattered(child, node, front)) return false;
-      }
-      for (const std::int32_t v : node.variables) front_row_[v] = -1;
-      if (progress_.scattered && inner) {
-        UninitializedVector product(node.update.size());  // where memory ends, all is as it was
-        progress_.children_part = std::exchange(node.update, std::move(product));
-      }
-      progress_.go_to(columns);
-      [[fallthrough]];
-    case columns:
-      if (!factorize_columns(node, front)) return false;
-      if (progress_.failed >= 0 || !inner) return true;
-      progress_.go_to(update);
-      next = node.columns / 8 * 8;
-      [[fallthrough]];
-    case update:
-      for (; next < stride; next = progress_.end) {
-        progress_.end = front.end_of_update(next);
-        if (!front.allows(front.of_update(next, progress_.end))) return false;
-        kernels_->update(panel, stride, node.columns, node.m, node.update.data(),
-                         static_cast<int>(next), static_cast<int>(progress_.end));
-      }
-      progress_.go_to(add_scattered_part);
-      [[fallthrough]];
-    case add_scattered_part:
-      if (!add_children_part(node, front)) return false;
-      progress_.go_to(add_to_update);
-      [[fallthrough]];
-    case add_to_update:
-      for (; next < std::ssize(node.children); ++next) {
-        const Node& child = nodes_[node.children[next]];
-        if (!child.straight) continue;
-        // The update matrix as if it were a part of the whole front.
-        double* const whole =
-            node.update.data() - node.columns * node.update_stride() - node.columns / 8 * 8;
-        if (!add_child(child, child.panel_rows, child.below(), whole, node.update_stride(), front))
-          return false;
-      }
-  }
-  return true;
-}
-
-/// The panel, strip by strip if the front is large.
-bool Tree::factorize_columns(Node& node, const FrontPieces& front) {
-  double* const panel = node.panel.data();
-  const std::int64_t stride = node.stride;
-  if (!block::is_large(node.m)) {
-    progress_.failed = block::factor_front<double>(*kernels_, panel, stride, node.columns, node.m);
-    return true;
-  }
-  std::int64_t& row = progress_.end;  // of the strip at hand: 0 before its pivots
-  for (; progress_.next < node.columns; progress_.next += block::kStripColumns, row = 0) {
-    const int first = static_cast<int>(progress_.next),
-              last = std::min(node.columns, first + block::kStripColumns);
-    if (row == 0) {
-      const int below = std::min(node.stride, round_up(last));
-      if (!front.allows(front.of_rows(first, last, below - first))) return false;
-      const int failed = kernels_->factor_panel(panel, stride, 0, first, last, below);
-      if (progress_.failed < 0) progress_.failed = failed;
-      row = below;
-    }
-    while (row < stride) {
-      const std::int64_t end = front.end_of_rows(first, last, row);
-      if (!front.allows(front.of_rows(first, last, end - row))) return false;
-      kernels_->factor_rows(panel, stride, 0, first, last, static_cast<int>(row),
-                            static_cast<int>(end));
-      row = end;
-    }
-  }
-  return true;
-}
-
-/// What scattered children have added beside the product.
-bool Tree::add_children_part(Node& node, const FrontPieces& front) {
-  const std::int64_t all = std::ssize(progress_.children_part);
-  for (std::int64_t& next = progress_.next; next < all; next = progress_.end) {
-    progress_.end = front.end_of_doubles(next, all);
-    if (!front.allows(kCost.panel_entry * static_cast<double>(progress_.end - next))) return false;
-    for (std::int64_t k = next; k < progress_.end; ++k)
-      node.update[k] += progress_.children_part[k];
-  }
-  progress_.children_part = UninitializedVector();
-  return true;
-}
-
-std::int32_t Tree::front_row(const Node& node, std::int32_t variable) const {
+void Tree::connect_children(const System& system, const Node& parent) {
+  front_row_.resize(variables_.size(), -1);
   std::int32_t row = 0;
-  for (const std::int32_t v : node.variables) {
-    if (v == variable) return row;
-    row += system_->size(v);
+  for (const std::int32_t v : parent.variables) {
+    front_row_[v] = row;
+    row += system.size(v);
   }
-  return -1;
+  for (const std::int32_t c : parent.children) connect(system, nodes_[c], parent);
+  for (const std::int32_t v : parent.variables) front_row_[v] = -1;
+}
+
+/// Where the rows of a child's update matrix are in the parent's front.
+void Tree::connect(const System& system, Node& child, const Node& parent) {
+  child.rows_above.clear();
+  for (const std::int32_t v : child.separator()) {
+    assert(front_row_[v] >= 0);
+    child.rows_above.push_back(front_row_[v]);
+  }
+  child.straight = std::ranges::is_sorted(child.rows_above);
+  child.spreads.clear();
+  child.panel_rows = 0;
+  if (!child.straight) return;
+  std::int32_t source = 0;
+  for (const std::int32_t v : child.separator()) {
+    const std::int32_t target = front_row_[v], size = system.size(v);
+    if (target < parent.columns) child.panel_rows += size;
+    block::append_rows(child.spreads, 0, source, target, size);
+    source += size;
+  }
+}
+
+// --- what it is ---
+
+bool Tree::below(std::int32_t variable, std::int32_t node) const {
+  std::int32_t n = node_of(variable);
+  while (n >= 0 && nodes_[n].sequence < nodes_[node].sequence) n = nodes_[n].parent;
+  return n == node;
 }
 
 double Tree::log_determinant() const {

@@ -9,9 +9,11 @@
 
 #include "cairn/graph/graph.hpp"
 #include "dense.hpp"
+#include "factorization.hpp"
 #include "growing_graph.hpp"
 #include "models.hpp"
 #include "states.hpp"
+#include "substitution.hpp"
 #include "tree.hpp"
 
 namespace cairn::incremental {
@@ -26,7 +28,7 @@ constexpr int kPoses = 120, kLoop = 12, kLast = 20;
 class Chain {
  public:
   Chain(const GrowingTypes& types, bool prior_at_the_end = false)
-      : type_(types.pose), tree_(system_, states_, bound_, *kernel_sets().back()) {
+      : type_(types.pose), tree_(*kernel_sets().back()) {
     const auto tangent = static_cast<std::size_t>(type_->tangent_size());
     std::vector<double> delta(tangent, 0.0), x(static_cast<std::size_t>(type_->ambient_size()));
     delta.front() = 1.0;
@@ -38,10 +40,11 @@ class Chain {
       graph_.add_variable(type_, k, x);
       states_.add(type_, graph_.state(k));
       system_.add_variable(type_->tangent_size());
-      bound_.push_back(k == 1);  // by its factor to the first
+      tree_.add_variable();
       held_.push_back(k == 0);
       type_->lie_group()->compose(x.data(), step.data(), x.data());
     }
+    tree_.bind(1, 1);  // by its factor to the first
     for (int k = 1; k < kPoses; ++k) add(types.relative_pose, {k - 1, k}, between(k - 1, k));
     for (int k = kLoop + 2; k < kPoses; ++k)
       add(types.relative_pose, {k - 2, k}, between(k - 2, k));
@@ -54,13 +57,13 @@ class Chain {
     if (prior_at_the_end) {
       const auto last = graph_.state(kPoses - 1);
       add(types.pose_prior, {kPoses - 1}, {last.begin(), last.end()});
-      ++bound_.back();
+      tree_.bind(kPoses - 1, 1);
     }
     std::vector<std::int64_t> touched_at(kPoses, 0);
     std::fill_n(touched_at.begin(), kLast + 1, 1);
     for (int k = 1; k < kPoses; ++k) tree_.touch(k);
-    tree_.restructure(touched_at, 1);
-    EXPECT_EQ(tree_.factorize(), -1);
+    tree_.restructure(system_, {touched_at, 1, {}});
+    EXPECT_EQ(Factorization().compute(system_, tree_), -1);
   }
   Chain(const Chain&) = delete;
   Chain& operator=(const Chain&) = delete;
@@ -74,15 +77,15 @@ class Chain {
                       [](double g) { return std::abs(g) > 1e-9; }))
         sources_.push_back(v);
     }
-    steps_.resize(static_cast<std::size_t>(system_.scalars()), 0.0);
-    tree_.solve(sources_, tolerance, system_.g(), steps_, changed_);
+    steps_.values.resize(static_cast<std::size_t>(system_.scalars()), 0.0);
+    substitution_.solve(system_, tree_, states_, motions_, sources_, tolerance, steps_);
     sources_.clear();
     const std::size_t count = move();
-    for (const Tree::Turn& turn : tree_.turns()) {
+    for (const Motions::Turn& turn : motions_.turns()) {
       for (int f = 0; f < models_.size(); ++f) {
         const auto below = [&](std::int32_t v) { return tree_.below(v, turn.node); };
         if (std::ranges::any_of(models_.variables(f), below))
-          models_.move(f, turn.variable, tree_.turned_steps().data() + turn.step);
+          models_.move(f, turn.variable, motions_.turned_steps().data() + turn.step);
       }
     }
     return count;
@@ -90,20 +93,19 @@ class Chain {
   /// What is owed everywhere.
   void follow_all() {
     for (int v = 1; v < kPoses; ++v) {
-      tree_.follow(v, steps_, changed_);
+      substitution_.follow(system_, tree_, states_, motions_, v, steps_);
       move();
     }
   }
   std::size_t move() {
-    const std::size_t count = changed_.size();
-    states_.move(changed_, steps_.data());
-    std::ranges::fill(steps_, 0.0);
-    changed_.clear();
+    const std::size_t count = steps_.changed.size();
+    states_.move(steps_.changed, steps_.values.data());
+    steps_.clear(system_);
     return count;
   }
   void undo() {
     states_.undo(
-        [&](std::int32_t node, std::span<const double> lead) { tree_.undo_lead(node, lead); });
+        [&](std::int32_t node, std::span<const double> lead) { motions_.undo(tree_, node, lead); });
   }
   /// Pulls once more, somewhere in the loop.
   void pull(double by) {
@@ -138,9 +140,11 @@ class Chain {
     }
     return sum.norm();
   }
-  bool turns() const { return !tree_.turns().empty(); }
+  bool turns() const { return !motions_.turns().empty(); }
   const double* travelled(std::int32_t v) const { return states_.travelled(v); }
-  Tree& tree() { return tree_; }
+  void settle(std::int32_t v) { motions_.settle(tree_, states_, v); }
+  void settle_all() { motions_.settle_all(tree_, states_); }
+  const Tree& tree() const { return tree_; }
   States& states() { return states_; }
 
  private:
@@ -170,11 +174,12 @@ class Chain {
   System system_;
   States states_;
   Models models_;
-  std::vector<std::int32_t> bound_;
   std::vector<std::uint8_t> held_;
   Tree tree_;
-  std::vector<std::int32_t> sources_, changed_;
-  std::vector<double> steps_;
+  Substitution substitution_;
+  Motions motions_;
+  std::vector<std::int32_t> sources_;
+  Steps steps_;
 };
 
 class MovingAsAWhole : public testing::TestWithParam<bool> {
@@ -188,7 +193,7 @@ TEST_P(MovingAsAWhole, IsWhatSolvingEverythingComesTo) {
   EXPECT_LT(moved.solve(1e-6), std::size_t{kPoses - 1} / 2);
   EXPECT_TRUE(moved.leads());
   EXPECT_GT(moved.distance(exact), 1.0) << "what hangs below has not been moved yet";
-  moved.tree().settle_all();
+  moved.settle_all();
   EXPECT_FALSE(moved.leads());
   EXPECT_GT(start.distance(exact), 1.0);
   EXPECT_LT(moved.distance(exact), 1e-2);
@@ -203,10 +208,10 @@ TEST_P(MovingAsAWhole, AddsUpOverManySteps) {
     for (Chain* chain : {&exact, &moved}) chain->pull(by);
     exact.solve(0.0);
     moved.solve(1e-6);
-    if (k % 5 == 2) moved.tree().settle(kPoses / 2 + k);
+    if (k % 5 == 2) moved.settle(kPoses / 2 + k);
   }
   EXPECT_TRUE(moved.leads());
-  moved.tree().settle_all();
+  moved.settle_all();
   EXPECT_LT(moved.distance(exact), 2e-2);
   moved.follow_all();
   EXPECT_LT(moved.distance(exact), 1e-4);
@@ -215,9 +220,9 @@ TEST_P(MovingAsAWhole, AddsUpOverManySteps) {
 TEST_P(MovingAsAWhole, SettlesAVariableAndWhatIsAboveIt) {
   Chain all(types_), one(types_);
   for (Chain* chain : {&all, &one}) chain->solve(1e-6);
-  all.tree().settle_all();
+  all.settle_all();
   for (const int v : {kPoses - 1, 20, 5, kPoses / 2}) {
-    one.tree().settle(v);
+    one.settle(v);
     const std::size_t ambient = static_cast<std::size_t>(one.states().ambient(v));
     EXPECT_EQ(std::vector(one.states().x(v), one.states().x(v) + ambient),
               std::vector(all.states().x(v), all.states().x(v) + ambient));
@@ -228,12 +233,12 @@ TEST_P(MovingAsAWhole, CanBeUndone) {
   Chain start(types_), chain(types_);
   chain.states().remember();
   chain.solve(1e-6);
-  chain.tree().settle(kLast + 1);
+  chain.settle(kLast + 1);
   EXPECT_TRUE(chain.leads());
   chain.undo();
   EXPECT_FALSE(chain.leads());
   EXPECT_EQ(chain.distance(start), 0.0);
-  chain.tree().settle_all();
+  chain.settle_all();
   EXPECT_EQ(chain.distance(start), 0.0);
 
   // And if there was a motion before, then that remains.
@@ -243,10 +248,10 @@ TEST_P(MovingAsAWhole, CanBeUndone) {
   twice.states().remember();
   twice.pull(1.0);
   twice.solve(1e-6);
-  twice.tree().settle(kLast + 1);
+  twice.settle(kLast + 1);
   twice.undo();
-  twice.tree().settle_all();
-  once.tree().settle_all();
+  twice.settle_all();
+  once.settle_all();
   EXPECT_LT(twice.distance(once), 1e-12);
 }
 
@@ -256,7 +261,7 @@ TEST_P(MovingAsAWhole, ChangesNoGradientByTheModels) {
   Chain chain(types_);
   chain.solve(1e-6);
   ASSERT_TRUE(chain.turns()) << "the motion is so small that it turns nothing";
-  chain.tree().settle_all();
+  chain.settle_all();
   chain.follow_all();
   for (std::int32_t v = kLast + 1; v < kPoses; ++v) {
     EXPECT_GT(std::abs(*chain.travelled(v)), 1e-3);
@@ -284,7 +289,7 @@ TEST_P(MovingAsAWhole, IsNotForWhatIsTiedToTheWorld) {
   }
   tied.solve(1e-6);
   exact.solve(0.0);
-  tied.tree().settle_all();
+  tied.settle_all();
   EXPECT_LT(tied.distance(exact), 1e-2);
 }
 

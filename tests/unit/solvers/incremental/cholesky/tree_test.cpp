@@ -10,7 +10,9 @@
 #include <set>
 
 #include "dense.hpp"
+#include "factorization.hpp"
 #include "inverse.hpp"
+#include "substitution.hpp"
 #include "support/dense_algebra.hpp"
 
 namespace cairn::incremental {
@@ -23,14 +25,14 @@ using Eigen::VectorXd;
 /// every edge adds JᵀJ of a random J to two of them.
 class Changing {
  public:
-  Changing(unsigned seed, const block::Kernels& kernels)
-      : rng_(seed), tree_(system_, states_, bound_, kernels) {}
+  Changing(unsigned seed, const block::Kernels& kernels) : rng_(seed), tree_(kernels) {}
   Changing(const Changing&) = delete;
   Changing& operator=(const Changing&) = delete;
 
   std::int32_t add_variable(std::int32_t size) {
     const std::int32_t v = system_.add_variable(size);
-    bound_.push_back(1);
+    tree_.add_variable();
+    tree_.bind(v, 1);
     touched_at_.push_back(time_);
     MatrixXd prior = MatrixXd::Identity(size, size);
     add_to_diagonal(v, prior);
@@ -96,14 +98,14 @@ class Changing {
 
   std::int32_t bring_up_to_date() {
     restructure();
-    return tree_.factorize();
+    return factorization_.compute(system_, tree_);
   }
   /// The tree as it is to be, whose affected nodes are still to be factorised.
   void restructure() {
     tree_.clear_affected();
     for (const std::int32_t v : touched_) tree_.touch(v);
     for (const std::int32_t v : retiring_) tree_.retire(v);
-    if (structure_changed_) tree_.restructure(touched_at_, time_ - 3);
+    if (structure_changed_) tree_.restructure(system_, {touched_at_, time_ - 3, {}});
     touched_.clear();
     retiring_.clear();
     structure_changed_ = false;
@@ -120,6 +122,15 @@ class Changing {
   MatrixXd H() const { return dense(system_, tree_); }
   Tree& tree() { return tree_; }
   System& system() { return system_; }
+  Factorization& factorization() { return factorization_; }
+  Substitution& substitution() { return substitution_; }
+  /// Solves for what is in g of the system.
+  double solve(std::span<const std::int32_t> sources, double tolerance, Steps& steps) {
+    return substitution_.solve(system_, tree_, states_, motions_, sources, tolerance, steps);
+  }
+  void follow(std::int32_t v, Steps& steps) {
+    substitution_.follow(system_, tree_, states_, motions_, v, steps);
+  }
   const std::vector<std::int32_t>& alive() const { return alive_; }
   std::mt19937& rng() { return rng_; }
 
@@ -144,8 +155,10 @@ class Changing {
   std::mt19937 rng_;
   System system_;
   States states_;
-  std::vector<std::int32_t> bound_;
   Tree tree_;
+  Factorization factorization_;
+  Substitution substitution_;
+  Motions motions_;
   std::vector<Edge> edges_;
   std::vector<std::int32_t> alive_, retiring_;
   std::set<std::int32_t> touched_;
@@ -177,13 +190,18 @@ void expect_sound(Changing& changing) {
     ASSERT_EQ(seen[static_cast<std::size_t>(v)], std::ranges::count(changing.alive(), v));
 }
 
+Eigen::Map<const VectorXd> all_of(const Steps& steps) {
+  return {steps.values.data(), std::ssize(steps.values)};
+}
+
 void expect_solutions(Changing& changing) {
   System& system = changing.system();
   Tree& tree = changing.tree();
   const MatrixXd H = changing.H(), Sigma = test::inverse_of(H);
   const auto n = static_cast<std::size_t>(system.scalars());
   const std::vector<std::int32_t> sources = changing.some(3);
-  std::vector<double> g(n, 0.0), steps(n, 0.0);
+  std::vector<double>& g = system.g();
+  Steps steps{std::vector<double>(n, 0.0), {}};
   for (const std::int32_t v : sources) {
     for (int k = 0; k < system.size(v); ++k)
       g[static_cast<std::size_t>(system.offset(v) + k)] = changing.number();
@@ -193,20 +211,19 @@ void expect_solutions(Changing& changing) {
   const VectorXd wanted = Sigma * right;
   const double decrement = right.dot(wanted), tolerance = 1e-10 * wanted.norm();
 
-  EXPECT_NEAR(tree.decrement(sources, g), decrement, 1e-10 * decrement);
+  EXPECT_NEAR(changing.substitution().decrement(system, tree, sources), decrement,
+              1e-10 * decrement);
   EXPECT_TRUE(std::ranges::all_of(g, [](double value) { return value == 0.0; }));
   g = before;
-  std::vector<std::int32_t> changed;
-  EXPECT_NEAR(tree.solve(sources, 0.0, g, steps, changed), decrement, 1e-10 * decrement);
+  EXPECT_NEAR(changing.solve(sources, 0.0, steps), decrement, 1e-10 * decrement);
   EXPECT_EQ(g, std::vector<double>(n, 0.0));
-  EXPECT_LT((Eigen::Map<const VectorXd>(steps.data(), std::ssize(steps)) - wanted).norm(),
-            tolerance);
-  std::set<std::int32_t> listed(changed.begin(), changed.end());
-  EXPECT_EQ(listed.size(), changed.size());
+  EXPECT_LT((all_of(steps) - wanted).norm(), tolerance);
+  std::set<std::int32_t> listed(steps.changed.begin(), steps.changed.end());
+  EXPECT_EQ(listed.size(), steps.changed.size());
   for (std::int32_t v = 0; v < system.variables(); ++v) {
     if (listed.contains(v)) continue;
     for (int k = 0; k < system.size(v); ++k)
-      EXPECT_EQ(steps[static_cast<std::size_t>(system.offset(v) + k)], 0.0);
+      EXPECT_EQ(steps.values[static_cast<std::size_t>(system.offset(v) + k)], 0.0);
   }
   EXPECT_NEAR(tree.log_determinant(),
               2.0 * MatrixXd(H.llt().matrixL()).diagonal().array().log().sum(), 1e-9);
@@ -214,7 +231,7 @@ void expect_solutions(Changing& changing) {
 
 void expect_columns(Changing& changing) {
   const System& system = changing.system();
-  Tree& tree = changing.tree();
+  const Tree& tree = changing.tree();
   const Eigen::Index n = system.scalars();
   const std::vector<std::int32_t> sources = changing.some(4);
   Eigen::Matrix<double, Eigen::Dynamic, 8, Eigen::RowMajor> B(n, 8);
@@ -226,11 +243,11 @@ void expect_columns(Changing& changing) {
   const MatrixXd wanted = test::inverse_of(changing.H()) * B;
   const double tolerance = 1e-10 * wanted.norm();
   AlignedVector X(B.data(), B.data() + B.size());
-  tree.solve_many(sources, X);
+  changing.substitution().solve_many(system, tree, sources, X);
   EXPECT_LT((Eigen::Map<decltype(B)>(X.data(), n, 8) - wanted).norm(), tolerance);
 
   X.assign(B.data(), B.data() + B.size());
-  tree.solve_many_above(sources, X);
+  changing.substitution().solve_many_above(system, tree, sources, X);
   const Eigen::Map<decltype(B)> above(X.data(), n, 8);
   for (const std::int32_t source : sources) {
     for (std::int32_t at = tree.node_of(source); at >= 0;) {
@@ -323,15 +340,15 @@ std::vector<double> numbers_of(const Tree& tree) {
 /// Goes on with a factorisation, one piece at a time; `pause` is called after each, with how much
 /// work it was.
 template <class Pause>
-std::int32_t factorize_in_pieces(Tree& tree, Pause pause) {
+std::int32_t factorize_in_pieces(Changing& changing, Pause pause) {
   double reads = 0.0;
   Pace pace;
   pace.set_clock([&] { return reads += 1.0; });
-  std::int32_t result = Tree::kPaused;
-  while (result == Tree::kPaused) {
+  std::int32_t result = Factorization::kPaused;
+  while (result == Factorization::kPaused) {
     pace.begin(0.5);
-    result = tree.factorize_more(pace);
-    if (result == Tree::kPaused) pause(pace.largest());
+    result = changing.factorization().more(changing.system(), changing.tree(), pace);
+    if (result == Factorization::kPaused) pause(pace.largest());
   }
   return result;
 }
@@ -372,21 +389,20 @@ TEST(Tree, AFactorizationThatPausesHasTheSameBits) {
     for (const std::int32_t v : changing.alive()) changing.touch(v);
     changing.restructure();
     const auto nodes = static_cast<int>(tree.affected().size());
-    ASSERT_EQ(tree.factorize(), -1);
+    ASSERT_EQ(changing.factorization().compute(changing.system(), tree), -1);
     const std::vector<double> wanted = numbers_of(tree);
 
-    tree.begin_factorization(0.0);
+    changing.factorization().begin(tree, 0.0);
     int pauses = 0;
-    const std::vector<std::int32_t> bound(changing.alive().size(), 1);
     const auto pause = [&](double) {
       if (++pauses % 40 != 0) return;
-      States states;
-      Tree copy(tree, changing.system(), states, bound);
+      Tree copy = tree;
+      Factorization rest = changing.factorization();
       Pace any;
-      ASSERT_EQ(copy.factorize_more(any), -1);
+      ASSERT_EQ(rest.more(changing.system(), copy, any), -1);
       ASSERT_EQ(numbers_of(copy), wanted) << kernels->name << ": a copy at pause " << pauses;
     };
-    ASSERT_EQ(factorize_in_pieces(tree, pause), -1);
+    ASSERT_EQ(factorize_in_pieces(changing, pause), -1);
     EXPECT_EQ(numbers_of(tree), wanted) << kernels->name;
     EXPECT_GT(pauses, nodes + 20) << "large fronts are divided";
     expect_solutions(changing);
@@ -396,8 +412,8 @@ TEST(Tree, AFactorizationThatPausesHasTheSameBits) {
                                                                        changing.system().size(bad));
     changing.add_to_diagonal(bad, -much);
     changing.restructure();
-    tree.begin_factorization(0.0);
-    EXPECT_EQ(factorize_in_pieces(tree, [](double) {}), bad) << kernels->name;
+    changing.factorization().begin(tree, 0.0);
+    EXPECT_EQ(factorize_in_pieces(changing, [](double) {}), bad) << kernels->name;
   }
 }
 
@@ -419,10 +435,11 @@ TEST(Tree, PiecesOfLargeFrontsAreAllSmall) {
                                     return node.columns > 300 && node.below() > 500;
                                   }),
             2);
-  tree.begin_factorization(0.0);
+  changing.factorization().begin(tree, 0.0);
   double largest = 0.0;  // [ns by the cost model]
-  ASSERT_EQ(factorize_in_pieces(tree, [&](double amount) { largest = std::max(largest, amount); }),
-            -1);
+  ASSERT_EQ(
+      factorize_in_pieces(changing, [&](double amount) { largest = std::max(largest, amount); }),
+      -1);
   EXPECT_LT(largest, 4e5);
 }
 
@@ -433,31 +450,27 @@ TEST(Tree, WhatIsOwedAndFollowedIsTheWholeSolution) {
     for (int k = 0; k < 150; ++k) changing.change();
     ASSERT_EQ(changing.bring_up_to_date(), -1);
     System& system = changing.system();
-    Tree& tree = changing.tree();
     const auto n = static_cast<std::size_t>(system.scalars());
-    std::vector<double> g(n, 0.0), steps(n, 0.0);
+    std::vector<double>& g = system.g();
+    Steps steps{std::vector<double>(n, 0.0), {}};
     VectorXd wanted = VectorXd::Zero(system.scalars());
-    std::vector<std::int32_t> changed;
     const MatrixXd Sigma = test::inverse_of(changing.H());
     for (int solution = 0; solution < 3; ++solution) {
       const std::vector<std::int32_t> sources = changing.some(2);
       for (const std::int32_t v : sources)
         g[static_cast<std::size_t>(system.offset(v))] = changing.number();
       wanted += Sigma * Eigen::Map<const VectorXd>(g.data(), std::ssize(g));
-      changed.clear();
-      tree.solve(sources, 1e-4, g, steps, changed);
+      steps.changed.clear();
+      changing.solve(sources, 1e-4, steps);
       if (solution == 0) {
-        EXPECT_LT(changed.size(), changing.alive().size()) << "seed " << seed;
+        EXPECT_LT(steps.changed.size(), changing.alive().size()) << "seed " << seed;
       }
     }
     // Its share is what each variable has got so far, and what it owes is all that is missing.
-    const VectorXd so_far = Eigen::Map<const VectorXd>(steps.data(), std::ssize(steps));
-    EXPECT_LT((so_far - wanted).norm(), 0.1) << "seed " << seed;
-    for (const std::int32_t v : changing.alive()) tree.follow(v, steps, changed);
-    EXPECT_LT((Eigen::Map<const VectorXd>(steps.data(), std::ssize(steps)) - wanted).norm(),
-              1e-10 * wanted.norm())
-        << "seed " << seed;
-    ASSERT_TRUE(std::ranges::none_of(tree.nodes(), &Node::owes));
+    EXPECT_LT((all_of(steps) - wanted).norm(), 0.1) << "seed " << seed;
+    for (const std::int32_t v : changing.alive()) changing.follow(v, steps);
+    EXPECT_LT((all_of(steps) - wanted).norm(), 1e-10 * wanted.norm()) << "seed " << seed;
+    ASSERT_TRUE(std::ranges::none_of(changing.tree().nodes(), &Node::owes));
   }
 }
 
@@ -537,9 +550,7 @@ TEST(Tree, ACopyStandsOnItsOwn) {
   for (int k = 0; k < 80; ++k) changing.change();
   ASSERT_EQ(changing.bring_up_to_date(), -1);
   const System system = changing.system();
-  States states;
-  const std::vector<std::int32_t> bound(static_cast<std::size_t>(system.variables()), 1);
-  const Tree copy(changing.tree(), system, states, bound);
+  const Tree copy = changing.tree();
   const double log_determinant = copy.log_determinant();
   const MatrixXd H = dense(system, copy);
   for (int k = 0; k < 20; ++k) changing.change();
