@@ -91,6 +91,7 @@ class AnswersKept {
 
   void in(Answers* answers) { answers_ = answers; }
   explicit operator bool() const { return answers_ != nullptr; }
+  Answers* get() const { return answers_; }
   Answers* operator->() const { return answers_; }
 
  private:

@@ -71,7 +71,7 @@ void Covariances::drop(std::int32_t v) {
   });
 }
 
-void Covariances::renumber(std::span<const std::int32_t> now) {
+Covariances Covariances::renumbered(std::span<const std::int32_t> now) const {
   Covariances anew;
   anew.kept_ = kept_;
   for (const auto& [pair, block] : crosses_) {
@@ -79,7 +79,7 @@ void Covariances::renumber(std::span<const std::int32_t> now) {
                        b = now[static_cast<std::size_t>(pair.second)];
     if (a >= 0 && b >= 0) anew.keep(a, b);
   }
-  *this = std::move(anew);
+  return anew;
 }
 
 void Covariances::note(const Models& models, const System& system, int f, double sign,

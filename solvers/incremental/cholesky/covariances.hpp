@@ -48,8 +48,9 @@ class Covariances {
             std::span<const std::uint8_t> held);
   /// Everything is new.
   void note_everything() { everything_ = true; }
-  /// Variables are numbered anew: now[v], or -1 for one that is gone. Everything is new.
-  void renumber(std::span<const std::int32_t> now);
+  /// The same ones to be kept where variables are numbered anew: now[v], or -1 for one that is
+  /// gone. Everything is new.
+  Covariances renumbered(std::span<const std::int32_t> now) const;
   void note_variable(std::int32_t v) { fresh_.push_back(v); }
   void keep(KeptMarginals kept);
   void keep(std::int32_t a, std::int32_t b);

@@ -12,28 +12,6 @@
 namespace cairn::incremental {
 namespace {
 
-// How the accuracy that is asked for, a fraction of chi2, is shared out. Found by trying on the
-// published graphs: what is left at the end stays well within it.
-constexpr double kEnough = 0.08;    ///< of it all: by how much more solving could lower chi2
-constexpr double kStepShare = 0.1;  ///< of a factor's: steps that are not followed down the tree
-/// So much may be left of the steps since the factors were evaluated, before they are again.
-constexpr double kLook = 0.15;
-/// A step that has gained so many times what may be left is looked at in any case.
-constexpr double kFar = 6.0;
-/// What is left is guessed from what was: a share of what the steps have gained, at least …
-constexpr double kLeastShare = 5e-3;
-constexpr double kOthersShare = 0.05;   ///< … where factors are not of poses alone, …
-constexpr double kForget = 0.5;         ///< … and not less than so much of the guess before, …
-constexpr double kOthersForget = 0.95;  ///< … where they are not
-/// What can still be gained is at most so many times what steps have fallen short of.
-constexpr double kCaution = 6.0;
-/// Gradients that promise up to so many times as much say that H is right.
-constexpr double kTrusted = 3.0;
-/// Where some factors are none of poses alone: while a solution leaves less than this fraction of
-/// what it has gained, H does as it is.
-constexpr double kFast = 0.2;
-/// Jacobians of such factors that are off by more than this part are renewed.
-constexpr double kMismatch = 0.05;
 /// What would lower chi2 by nothing that matters is solved for once it comes from so many
 /// variables, or each update would look at all that came since the last step.
 constexpr std::size_t kMostSources = 256;
@@ -58,460 +36,425 @@ constexpr double kCopySeconds = 0.15e-6;
 
 void Engine::solve(double max_seconds, UpdateReport& report) {
   pace_.begin(max_seconds);
-  while (busy() || begin_job(report)) {
-    if (!go_on(report) || !admit_waiting()) break;
-    if (!pace_.allows(Work::order, 1.0)) break;
+  while (busy() || begin(report)) {
+    if (!go_on(report)) break;
+    const bool more = problem_.waiting() > 0;
+    followers_.place(problem_);
+    followers_.clear();
+    problem_.admit_waiting();
+    if (!more || !pace_.allows(Work::order, 1.0)) break;
   }
-  const int waiting = models_.size() - admitted_;
   if (busy()) {
     show_what_is_proven();
-    report.owed = std::max(job_.factors, 1) + waiting;
-  } else if (!touched_.empty()) {
-    report.owed += unsolved_;
+    report.owed = std::max(solution_.factors, 1) + problem_.waiting();
+  } else if (!problem_.change.touched.empty()) {
+    report.owed += problem_.change.factors;
   }
   report.ok = !broken_;
 }
 
 /// Whether there is anything to be solved for.
-bool Engine::begin_job(UpdateReport& report) {
-  settle_gauge();
-  ++time_;
-  states_.remember();
+bool Engine::begin(UpdateReport& report) {
+  Change& change = problem_.change;
+  problem_.begin_solution();
   if (broken_) {
-    diverged(report);
+    solution_.go_to(diverged(report));
     return busy();
   }
-  if (must_look_) bring_back();
-  if (touched_.empty() && sources_.empty()) return false;
-  job_ = {};
-  job_.factors = std::exchange(unsolved_, 0);
-  job_.at_first = cost();
-  job_.go_to(Job::Stage::order);
+  if (change.must_look) problem_.bring_back();
+  if (change.touched.empty() && change.sources.list().empty()) return false;
+  solution_ = {
+      .stage = Stage::order, .at_first = cost(), .factors = std::exchange(change.factors, 0)};
   return true;
 }
 
-/// Continues the job until it has ended. False if there was no time for that.
+/// Continues the solution until it has ended. False if there was no time for that.
 bool Engine::go_on(UpdateReport& report) {
   while (busy()) {
-    if (!advance(report)) return false;
+    const Next next = advance(report);
+    if (!next) return false;
+    solution_.go_to(*next);
   }
   return true;
 }
 
-void Engine::end_job() {
-  job_ = {};
+Engine::Stage Engine::end() {
+  solution_ = {};
   exhausted_ = false;
-  pace_.keep_free(0.0);
-  shown_.reset();
+  hide_unproven();
+  return Stage::none;
 }
 
-/// A stage of the job. False if there was no time for all of it.
-bool Engine::advance(UpdateReport& report) {
-  using enum Job::Stage;
+Engine::Next Engine::advance(UpdateReport& report) {
+  using enum Solution::Stage;
   UpdateSeconds& seconds = report.seconds;
-  switch (job_.stage) {
+  const auto timed = [](double& sum, auto stage) {
+    const Timed time(sum);
+    return stage();
+  };
+  switch (solution_.stage) {
     case none:
       break;
     case order:
-      return order_affected(report);
+      return timed(seconds.order, [&] { return this->order(report); });
     case factorize:
-      return factorize_more(report);
-    case right_hand_side: {
-      const Timed timed(seconds.solve);
-      if (!set_right_hand_side_more()) return false;
-      for (const std::int32_t v : sources_) system_.mark_solved(v);
-      substitution_.begin_climb(tree_, sources_);
-      job_.go_to(climb);
-      break;
-    }
-    case climb: {
-      const Timed timed(seconds.solve);
-      if (!substitution_.climb(system_, tree_, pace_)) return false;
-      decrease_ = substitution_.climbed();
-      gained_ += decrease_;
-      for (const std::int32_t v : sources_) is_source_[v] = 0;
-      sources_.clear();
-      job_.unproven = true;
-      if (!shown_) pace_.keep_free(kCopySeconds * states_.size());
-      substitution_.begin_descent(tree_, motions_);
-      job_.go_to(descend);
-      break;
-    }
-    case descend: {
-      const Timed timed(seconds.solve);
-      if (!substitution_.descend(system_, tree_, states_, motions_, job_.tolerance, steps_, pace_))
-        return false;
-      job_.go_to(move_states);
-      break;
-    }
+      return this->factorize(report);
+    case right_hand_side:
+      return timed(seconds.solve, [&] { return set_right_hand_side(); });
+    case climb:
+      return timed(seconds.solve, [&] { return this->climb(); });
+    case descend:
+      return timed(seconds.solve, [&] { return this->descend(); });
     case move_states:
-    case turn_models: {
-      const Timed timed(seconds.check);
-      if (!move_more()) return false;
-      if (job_.damped == Job::Damped::tried) {
-        begin_relinearizing_all();
-      } else {
-        look(report);
-      }
-      break;
-    }
-    case evaluate: {
-      const Timed timed(seconds.check);
-      if (!evaluate_more()) return false;
-      evaluated(report);
-      break;
-    }
-    case gradient: {
-      const Timed timed(seconds.solve);
-      if (!set_right_hand_side_more()) return false;
-      gradients_.resize(system_.g().size());
-      for (const std::int32_t v : sources_)
-        std::copy_n(system_.g(v), system_.size(v), gradients_.data() + system_.offset(v));
-      substitution_.begin_climb(tree_, sources_);
-      job_.go_to(decrement);
-      break;
-    }
-    case decrement: {
-      const Timed timed(seconds.solve);
-      if (!substitution_.climb(system_, tree_, pace_)) return false;
-      substitution_.end_decrement(system_, tree_);
-      improve(report);
-      break;
-    }
-    case set_aside: {
-      const Timed timed(seconds.solve);
-      return set_aside_more();
-    }
-    case relinearize: {
-      const Timed timed(seconds.linearize);
-      return relinearize_more(report);
-    }
+      return timed(seconds.check, [&] { return this->move_states(); });
+    case turn_models:
+      return timed(seconds.check, [&] { return this->turn_models(report); });
+    case evaluate:
+      return timed(seconds.check, [&] { return this->evaluate(report); });
+    case gradient:
+      return timed(seconds.solve, [&] { return evaluate_gradients(); });
+    case decrement:
+      return timed(seconds.solve, [&] { return this->decrement(report); });
+    case set_aside:
+      return timed(seconds.solve, [&] { return this->set_aside(); });
+    case relinearize:
+      return timed(seconds.linearize, [&] { return this->relinearize(report); });
     case follow_all:
+      return timed(seconds.linearize, [&] { return this->follow_all(); });
     case frame_all:
-    case linearize_all: {
-      const Timed timed(seconds.linearize);
-      if (!relinearize_all_more()) return false;
-      linearized_all(report);
-      break;
-    }
+      return timed(seconds.linearize, [&] { return this->frame_all(); });
+    case linearize_all:
+      return timed(seconds.linearize, [&] { return this->linearize_all(report); });
   }
-  return true;
+  return none;
 }
 
 /// Finds what is affected, and orders it anew if blocks of H have come or gone.
-bool Engine::order_affected(UpdateReport& report) {
-  const Timed timed(report.seconds.order);
-  tree_.clear_affected();
-  if (structure_changed_ && tree_.worn_out() &&
-      (!pace_.limited() || tree_.seconds_to_order_anew() < pace_.limit())) {
-    touch_all();
+Engine::Next Engine::order(UpdateReport& report) {
+  Tree& tree = problem_.tree;
+  Change& change = problem_.change;
+  tree.clear_affected();
+  if (change.of_structure && tree.worn_out() &&
+      (!pace_.limited() || tree.seconds_to_order_anew() < pace_.limit())) {
+    for (int v = 0; v < problem_.states.size(); ++v) problem_.follow_and_touch(v);
   }
-  for (const std::int32_t v : touched_) {
-    if (!held_[v] || tree_.node_of(v) >= 0) tree_.touch(v);
+  problem_.mark_affected();
+  if (change.of_structure) {
+    const std::vector<Expected> expected = prepare_for_revisits();
+    if (!pace_.allows(Work::order, tree.affected_variables())) return std::nullopt;
+    const Visits& visits = problem_.visits;
+    tree.restructure(problem_.system, {visits.last, visits.now - settings_.recent, expected});
+    problem_.states.remember();  // nodes keep their numbers from here on
   }
-  for (const std::int32_t v : retiring_) tree_.retire(v);
-  if (structure_changed_) {
-    prepare_for_revisits();
-    if (!pace_.allows(Work::order, tree_.affected_variables())) return false;
-    tree_.restructure(system_, {touched_at_, time_ - settings_.recent, expected_});
-    states_.remember();  // nodes keep their numbers from here on
-  }
-  retiring_.clear();
-  structure_changed_ = false;
-  report.affected_variables += tree_.affected_variables();
-  for (const std::int32_t v : touched_) add_source(v);
-  touched_.clear();
-  if (job_.damped == Job::Damped::no) job_.before = cost();
-  factorization_.begin(tree_, job_.damped == Job::Damped::no ? 0.0 : job_.lambda);
-  job_.go_to(Job::Stage::factorize);
-  return true;
+  report.affected_variables += tree.affected_variables();
+  problem_.take_touched();
+  if (solution_.damping.stage() == Damping::Stage::none) solution_.before = cost();
+  factorization_.begin(tree, solution_.damping.lambda());
+  return Stage::factorize;
 }
 
 /// Touches what measurements will probably join next, where that costs little beside what is
-/// affected anyway: ordered last together, the paths of the next updates are short.
-void Engine::prepare_for_revisits() {
-  expected_.clear();
-  const double cost = tree_.affected_cost();
+/// affected anyway: ordered last together, the paths of the next updates are short. Returns what
+/// they will join.
+std::vector<Expected> Engine::prepare_for_revisits() {
+  Tree& tree = problem_.tree;
+  Visits& visits = problem_.visits;
+  std::vector<Expected> expected;
+  const double cost = tree.affected_cost();
   double budget = kPreparation * cost;
-  for (Revisits::Run& run : revisits_.at(time_)) {
+  for (Revisits::Run& run : visits.revisits.at(visits.now)) {
     bool prepare = !run.was_prepared();
     if (prepare && cost <= settings_.prepares_above) continue;
     for (std::int32_t k = 1; k <= run.expected(); ++k) {
       const std::int32_t v = run.variable + k * run.direction;
-      if (v < 0 || v >= states_.size()) break;
-      if (!live_variable_[v] || held_[v] || tree_.node_of(v) < 0) continue;
-      expected_.push_back({v, k <= kSoon});
+      if (v < 0 || v >= problem_.states.size()) break;
+      if (!problem_.is_free(v) || tree.node_of(v) < 0) continue;
+      expected.push_back({v, k <= kSoon});
       if (!prepare) continue;
-      const double more = tree_.cost_to_touch(v, budget);
+      const double more = tree.cost_to_touch(v, budget);
       prepare = more <= budget;
       if (!prepare) continue;
       if (more > 0.0) {
         ++prepared_;
         budget -= more;
-        follow(v);
-        tree_.touch(v);
+        problem_.follow(v);
+        tree.touch(v);
       }
       run.prepared_to = v;
-      run.prepared_at = time_;
+      run.prepared_at = visits.now;
     }
   }
+  return expected;
 }
 
-bool Engine::factorize_more(UpdateReport& report) {
+Engine::Next Engine::factorize(UpdateReport& report) {
   std::int32_t result = 0;
   {
     const Timed timed(report.seconds.factorize);
-    result = factorization_.more(system_, tree_, pace_);
+    result = factorization_.more(problem_.system, problem_.tree, pace_);
   }
-  if (result == Factorization::kPaused) return false;
-  if (result == Factorization::kDone) {
-    factorized(report);
-  } else {
-    not_positive_definite(report);
-  }
-  return true;
+  if (result == Factorization::kPaused) return std::nullopt;
+  return result == Factorization::kDone ? factorized(report) : not_positive_definite(report);
 }
 
-void Engine::factorized(UpdateReport& report) {
-  job_.tolerance = 0.0;
-  switch (job_.damped) {
-    case Job::Damped::no:
-      if (job_.rounds == 0 && sources_.size() < kMostSources && negligible()) return end_job();
-      job_.tolerance = share(kStepShare);
+Engine::Stage Engine::factorized(UpdateReport& report) {
+  solution_.tolerance = 0.0;
+  switch (solution_.damping.stage()) {
+    case Damping::Stage::none:
+      if (solution_.rounds == 0 && problem_.change.sources.list().size() < kMostSources &&
+          negligible())
+        return end();
+      solution_.tolerance = outlook_.tolerance(cost(), problem_.live_factors());
       break;
-    case Job::Damped::begun:
-      states_.remember();
-      job_.damped = Job::Damped::tried;
+    case Damping::Stage::begun:
+      problem_.states.remember();
+      solution_.damping.take_step();
       break;
-    case Job::Damped::tried:
+    case Damping::Stage::tried:
       break;
-    case Job::Damped::last:
+    case Damping::Stage::last:
       broken_ = undetermined_;
-      if (job_.converged) break;
+      if (solution_.damping.has_converged()) break;
       report.converged = false;
-      report.doubt(fmt::format("not converged after {} iterations", job_.rounds));
-      return end_job();
+      report.doubt(fmt::format("not converged after {} iterations", solution_.rounds));
+      return end();
   }
-  job_.go_to(Job::Stage::right_hand_side);
+  return Stage::right_hand_side;
 }
 
 /// Whether what has not been solved for yet would lower chi2 by nothing that matters.
 bool Engine::negligible() {
-  for (const std::int32_t v : sources_) {
-    settle(v);
-    models_.right_hand_side(system_, states_, v);
-  }
-  const double gain = substitution_.decrement(system_, tree_, sources_);
-  return gain <= std::min(settings_.significance, kEnough * settings_.accuracy * cost());
+  const std::vector<std::int32_t>& sources = problem_.change.sources.list();
+  for (const std::int32_t v : sources) problem_.right_hand_side(v);
+  const double gain = problem_.substitution.decrement(problem_.system, problem_.tree, sources);
+  return gain <= std::min(settings_.significance, outlook_.negligible(cost()));
 }
 
-/// A share of the accuracy that is asked for, of the mean cost of a factor.
-double Engine::share(double part) const {
-  return part * settings_.accuracy * cost() / std::max(live_factors_, 1);
-}
-
-bool Engine::set_right_hand_side_more() {
-  for (; job_.next < sources_.size(); ++job_.next) {
+/// g of all sources. False if there was no time for that.
+bool Engine::find_right_hand_side() {
+  const std::vector<std::int32_t>& sources = problem_.change.sources.list();
+  for (; solution_.next < sources.size(); ++solution_.next) {
     if (!pace_.allows(Work::move, 1.0)) return false;
-    const std::int32_t v = sources_[job_.next];
-    settle(v);
-    models_.right_hand_side(system_, states_, v);
+    problem_.right_hand_side(sources[solution_.next]);
   }
+  problem_.substitution.begin_climb(problem_.tree, sources);
   return true;
 }
 
-void Engine::touch_all() {
-  for (int v = 0; v < states_.size(); ++v) {
-    if (!live_variable_[v] || held_[v]) continue;
-    follow(v);
-    touch(v);
-  }
+Engine::Next Engine::set_right_hand_side() {
+  if (!find_right_hand_side()) return std::nullopt;
+  for (const std::int32_t v : problem_.change.sources.list()) problem_.system.mark_solved(v);
+  return Stage::climb;
 }
 
-/// Moves the estimate by the step.
-bool Engine::move_more() {
-  if (job_.stage == Job::Stage::move_states) {
-    while (job_.next < steps_.changed.size()) {
-      const std::size_t count = std::min(steps_.changed.size() - job_.next, kAtOnce);
-      if (!pace_.allows(Work::move, static_cast<double>(count))) return false;
-      move_states(std::span(steps_.changed).subspan(job_.next, count));
-      job_.next += count;
-    }
-    job_.go_to(Job::Stage::turn_models);
+Engine::Next Engine::climb() {
+  Substitution& substitution = problem_.substitution;
+  if (!substitution.climb(problem_.system, problem_.tree, pace_)) return std::nullopt;
+  outlook_.step(substitution.climbed());
+  problem_.change.sources.clear();
+  solution_.unproven = true;
+  if (!shown_) pace_.keep_free(kCopySeconds * problem_.states.size());
+  substitution.begin_descent(problem_.tree, problem_.motions);
+  return Stage::descend;
+}
+
+Engine::Next Engine::descend() {
+  if (!problem_.substitution.descend(problem_.system, problem_.tree, problem_.states,
+                                     problem_.motions, solution_.tolerance, problem_.steps, pace_))
+    return std::nullopt;
+  return Stage::move_states;
+}
+
+Engine::Next Engine::move_states() {
+  const std::span<const std::int32_t> changed = problem_.steps.changed;
+  while (solution_.next < changed.size()) {
+    const std::size_t count = std::min(changed.size() - solution_.next, kAtOnce);
+    if (!pace_.allows(Work::move, static_cast<double>(count))) return std::nullopt;
+    problem_.move(changed.subspan(solution_.next, count));
+    solution_.next += count;
   }
-  for (const auto turns = motions_.turns(); job_.next < turns.size(); ++job_.next) {
-    const auto factors = factors_of_[turns[job_.next].variable].size();
-    if (!pace_.allows(Work::move, static_cast<double>(factors))) return false;
-    turn_models(turns[job_.next]);
+  return Stage::turn_models;
+}
+
+Engine::Next Engine::turn_models(UpdateReport& report) {
+  for (const auto turns = problem_.motions.turns(); solution_.next < turns.size();
+       ++solution_.next) {
+    const Motions::Turn& turn = turns[solution_.next];
+    const auto factors = problem_.factors_of(turn.variable).size();
+    if (!pace_.allows(Work::move, static_cast<double>(factors))) return std::nullopt;
+    problem_.turn_models(turn);
   }
-  steps_.clear(system_);
-  return true;
+  problem_.steps.clear(problem_.system);
+  if (solution_.damping.stage() == Damping::Stage::tried) return begin_relinearizing_all();
+  return look(report);
 }
 
 /// After a step: if what is known of the factors may be wrong by too much, all that have moved are
 /// to be evaluated: few of them alone would say nothing of the rest.
-void Engine::look(UpdateReport& report) {
-  const bool last = job_.damped == Job::Damped::last;
+Engine::Stage Engine::look(UpdateReport& report) {
+  const bool last = solution_.damping.stage() == Damping::Stage::last;
   if (!last) ++report.iterations;
-  const bool anyway =
-      std::exchange(must_look_, false) || live_factors_ <= kFew || last || job_.rounds > 0;
-  ++job_.rounds;
-  const double allowed = settings_.accuracy * cost();
-  if (!anyway && left_share_ * gained_ <= kLook * allowed && decrease_ <= kFar * allowed)
-    return end_job();
-  job_.expected = cost();
-  looked_at_ = std::exchange(gained_, 0.0);
-  collect_moved_factors();
-  job_.square = 0.0;
-  job_.compared = 0;
-  job_.go_to(Job::Stage::evaluate);
+  const bool anyway = std::exchange(problem_.change.must_look, false) ||
+                      problem_.live_factors() <= kFew || last || solution_.rounds > 0;
+  ++solution_.rounds;
+  if (!anyway && outlook_.is_sure(cost())) return end();
+  outlook_.begin_evaluation(problem_.cost());
+  solution_.looked_at = problem_.take_moved_factors();
+  return Stage::evaluate;
 }
 
-bool Engine::evaluate_more() {
-  while (job_.next < looked_.size()) {
-    std::size_t end = job_.next;
-    together_.clear();
-    for (; end < looked_.size() && together_.size() < kAtOnce; ++end) {
-      if (!live_factor_[looked_[end]]) continue;
-      if (!together_.empty() && !models_.alike(together_.front(), looked_[end])) break;
-      together_.push_back(looked_[end]);
+Engine::Next Engine::evaluate(UpdateReport& report) {
+  const std::vector<std::int32_t>& all = solution_.looked_at;
+  const Models& models = problem_.models;
+  std::vector<std::int32_t> together;
+  together.reserve(kAtOnce);
+  while (solution_.next < all.size()) {
+    std::size_t end = solution_.next;
+    together.clear();
+    for (; end < all.size() && together.size() < kAtOnce; ++end) {
+      if (!problem_.live_factor(all[end])) continue;
+      if (!together.empty() && !models.alike(together.front(), all[end])) break;
+      together.push_back(all[end]);
     }
-    if (!pace_.allows(Work::evaluate, static_cast<double>(together_.size()))) return false;
-    evaluate(together_);
-    job_.next = end;
-  }
-  mismatch_ = job_.compared > 0 ? std::sqrt(job_.square / job_.compared) : 0.0;
-  shortfall_ = cost_ - job_.expected;
-  return true;
-}
-
-/// Evaluates factors that are alike again. Where a factor type throws, nothing has changed.
-void Engine::evaluate(std::span<const std::int32_t> factors) {
-  double before = 0.0, now = 0.0;
-  for (const std::int32_t f : factors) {
-    for (const std::int32_t v : models_.variables(f)) {
-      if (is_source_[v]) continue;
-      settle(v);
-      add_source(v);
+    if (!pace_.allows(Work::evaluate, static_cast<double>(together.size()))) return std::nullopt;
+    problem_.evaluate(together);
+    for (const std::int32_t f : together) {
+      if (problem_.others() > 0 && problem_.is_other(f))
+        outlook_.note_mismatch(models.mismatch(f, graph(), problem_.states));
     }
-    before += models_.cost(f);
+    solution_.next = end;
   }
-  models_.correct(factors, graph_, states_, system_, held_);
-  for (const std::int32_t f : factors) now += models_.cost(f);
-  cost_ += now - before;
-  for (const std::int32_t f : factors) {
-    if (others_ == 0 || !is_other(f)) continue;
-    const double mismatch = models_.mismatch(f, graph_, states_);
-    job_.square += mismatch * mismatch;
-    ++job_.compared;
-  }
-}
-
-void Engine::evaluated(UpdateReport& report) {
-  if (job_.damped == Job::Damped::last) return end_job();
+  const double cost = problem_.cost();
+  outlook_.end_evaluation(cost);
+  if (solution_.damping.stage() == Damping::Stage::last) return end();
   // Negated, so that what is not a number is bad too.
-  if (!(cost_ <= 2.0 * job_.before + rounding())) return diverged(report);
-  if (pace_.limited() && cost_ <= job_.before + rounding()) prove();
-  job_.go_to(Job::Stage::gradient);
+  if (!(cost <= 2.0 * solution_.before + problem_.rounding())) return diverged(report);
+  if (pace_.limited() && cost <= solution_.before + problem_.rounding()) prove();
+  return Stage::gradient;
 }
 
 /// The estimate is as good as it was before the round: it may be seen, and is what a later round
 /// would go back to.
 void Engine::prove() {
-  job_.unproven = false;
-  pace_.keep_free(0.0);
-  shown_.reset();
-  place_followers();
-  states_.remember();
+  hide_unproven();
+  followers_.place(problem_);
+  problem_.states.remember();
 }
 
-/// Whether to solve once more: whether that would lower chi2 noticeably.
-///
-/// The gradients that are left would gain gᵀH⁻¹g if H were right, and for poses alone, as a rule,
-/// not much more than what chi2 has fallen short of (see docs/online.md). If both agree, H does as
-/// it is; if the former is much larger, H is not that of the current estimate, and what has moved
-/// is relinearised.
-void Engine::improve(UpdateReport& report) {
-  const double left =
-      std::min(substitution_.climbed(), cost_);  // more is rounding: chi2 is not negative
-  const double allowed = settings_.accuracy * cost_ + rounding();
+/// The estimate is again one that may be seen.
+void Engine::hide_unproven() {
+  solution_.unproven = false;
+  pace_.keep_free(0.0);
+  shown_.reset();
+}
+
+/// Keeps the estimate from before a step that has not been evaluated.
+void Engine::show_what_is_proven() {
+  if (!solution_.unproven || shown_) return;
+  Leads leads;
+  Estimate before = problem_.states.before([&](std::int32_t node, std::span<const double> lead) {
+    leads[node].assign(lead.begin(), lead.end());
+  });
+  shown_ = settled(problem_.tree, problem_.states, std::move(before), leads);
+}
+
+Engine::Next Engine::evaluate_gradients() {
+  if (!find_right_hand_side()) return std::nullopt;
+  System& system = problem_.system;
+  const std::vector<std::int32_t>& sources = problem_.change.sources.list();
+  std::size_t doubles = 0;
+  for (const std::int32_t v : sources) doubles += static_cast<std::size_t>(system.size(v));
+  solution_.gradients.resize(doubles);
+  double* next = solution_.gradients.data();
+  for (const std::int32_t v : sources) next = std::copy_n(system.g(v), system.size(v), next);
+  return Stage::decrement;
+}
+
+Engine::Next Engine::decrement(UpdateReport& report) {
+  if (!problem_.substitution.climb(problem_.system, problem_.tree, pace_)) return std::nullopt;
+  problem_.substitution.end_decrement(problem_.system, problem_.tree);
+  return improve(report);
+}
+
+/// Whether to solve once more: whether that would lower chi2 noticeably. If H is not that of the
+/// current estimate, what has moved is relinearised.
+Engine::Stage Engine::improve(UpdateReport& report) {
+  const int looked_at = static_cast<int>(solution_.looked_at.size());
+  const bool poses_alone = problem_.others() == 0 && problem_.live_factors() > kFew;
+  const Outlook::Judgement judgement = outlook_.judge(
+      problem_.substitution.climbed(), problem_.cost(), problem_.rounding(), poses_alone);
   report.owed = 0;
-  const bool poses_alone = others_ == 0 && live_factors_ > kFew;
-  const double likely = poses_alone ? std::min(left, kCaution * std::abs(shortfall_)) : left;
-  left_share_ = poses_alone ? std::max(kForget * left_share_, kLeastShare)
-                            : std::max(kOthersForget * left_share_, kOthersShare);
-  if (looked_at_ > 0.0) left_share_ = std::clamp(likely / looked_at_, left_share_, 1.0);
-  const bool right =
-      poses_alone ? left <= std::min(kTrusted * likely, looked_at_) : left <= kFast * looked_at_;
-  if (likely <= kEnough * allowed && mismatch_ <= kMismatch)
-    return job_.go_to(Job::Stage::set_aside);
-  if (job_.rounds >= settings_.iterations) {
+  if (judgement.is_enough) return Stage::set_aside;
+  if (solution_.rounds >= settings_.iterations) {
     // The next update goes on; where that is not enough either, Gauss-Newton may never be.
-    const bool hopeless = exhausted_ && job_.rounds >= kPatience && likely > settings_.significance;
+    const bool hopeless =
+        exhausted_ && solution_.rounds >= kPatience && judgement.likely > settings_.significance;
     if (hopeless) {
-      if (cost_ <= job_.at_first + rounding()) prove();
+      if (problem_.cost() <= solution_.at_first + problem_.rounding()) prove();
       return diverged(report);
     }
-    report.owed = static_cast<int>(looked_.size());
-    end_job();
+    report.owed = looked_at;
+    end();
     exhausted_ = true;
-    return;
+    return Stage::none;
   }
-  job_.factors = static_cast<int>(looked_.size());
-  if (right && mismatch_ <= kMismatch) return job_.go_to(Job::Stage::order);
-  if (job_.rounds >= 2 || static_cast<double>(looked_.size()) > kMost * live_factors_)
+  solution_.factors = looked_at;
+  if (judgement.H_is_right) return Stage::order;
+  if (solution_.rounds >= 2 || looked_at > kMost * problem_.live_factors())
     return begin_relinearizing_all();
-  job_.go_to(Job::Stage::relinearize);
+  return Stage::relinearize;
 }
 
 /// Leaves the gradients at hand alone until the factors are evaluated again: with an old H, what
 /// little they have to tell might do more harm than good.
-bool Engine::set_aside_more() {
-  for (; job_.next < sources_.size(); ++job_.next) {
-    if (!pace_.allows(Work::move, 1.0)) return false;
-    const std::int32_t v = sources_[job_.next];
-    std::copy_n(gradients_.data() + system_.offset(v), system_.size(v), system_.g(v));
-    system_.set_aside(v);
-    is_source_[v] = 0;
+Engine::Next Engine::set_aside() {
+  System& system = problem_.system;
+  const std::vector<std::int32_t>& sources = problem_.change.sources.list();
+  for (; solution_.next < sources.size(); ++solution_.next) {
+    if (!pace_.allows(Work::move, 1.0)) return std::nullopt;
+    const std::int32_t v = sources[solution_.next], size = system.size(v);
+    std::copy_n(solution_.gradients.data() + solution_.next_gradient, size, system.g(v));
+    solution_.next_gradient += static_cast<std::size_t>(size);
+    system.set_aside(v);
   }
-  sources_.clear();
-  end_job();
-  return true;
+  problem_.change.sources.clear();
+  return end();
 }
 
-bool Engine::relinearize_more(UpdateReport& report) {
-  for (; job_.next < looked_.size(); ++job_.next) {
-    const std::int32_t f = looked_[job_.next];
-    if (!live_factor_[f]) continue;
-    if (!pace_.allows(Work::linearize, 1.0)) return false;
-    relinearize(f);
+Engine::Next Engine::relinearize(UpdateReport& report) {
+  for (; solution_.next < solution_.looked_at.size(); ++solution_.next) {
+    const std::int32_t f = solution_.looked_at[solution_.next];
+    if (!problem_.live_factor(f)) continue;
+    if (!pace_.allows(Work::linearize, 1.0)) return std::nullopt;
+    problem_.relinearize(f);
     ++report.relinearized_factors;
   }
-  job_.go_to(Job::Stage::order);
-  return true;
+  return Stage::order;
 }
 
 /// A step with the factor at hand to its end, and everything that has moved evaluated.
 void Engine::step_and_look(UpdateReport& report) {
-  job_ = {};
-  job_.damped = Job::Damped::last;
-  job_.go_to(Job::Stage::right_hand_side);
+  solution_ = {.stage = Stage::right_hand_side};
+  solution_.damping.end(true);
   go_on(report);
 }
 
-void Engine::relinearize_all() {
-  begin_relinearizing_all();
-  relinearize_all_more();
-  job_ = {};
+void Engine::relinearize_all(UpdateReport& report) {
+  solution_ = {.stage = begin_relinearizing_all()};
+  while (solution_.stage != Stage::order) solution_.go_to(*advance(report));
+  solution_ = {};
 }
 
 /// The factor of H as it is now. False if H is not positive definite.
 bool Engine::bring_factor_up_to_date(UpdateReport& report) {
-  job_ = {};
-  order_affected(report);
-  job_ = {};
+  solution_ = {};
+  {
+    const Timed timed(report.seconds.order);
+    order(report);
+  }
+  solution_ = {};
   const Timed timed(report.seconds.factorize);
-  return factorization_.more(system_, tree_, pace_) == Factorization::kDone;
+  return factorization_.more(problem_.system, problem_.tree, pace_) == Factorization::kDone;
 }
 
 }  // namespace cairn::incremental

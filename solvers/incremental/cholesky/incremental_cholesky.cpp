@@ -122,9 +122,9 @@ UpdateReport IncrementalCholesky::carry_out(const GraphUpdate& update,
   small_pages.reset();
   report_free(report);
   if (report.ok && since_solved_ == 0 && engine_->up_to_date() &&
-      engine_->covariances().keeps_anything()) {
+      engine_->problem().covariances.keeps_anything()) {
     const Clock::time_point covariances_begin = Clock::now();
-    report.marginals_by = engine_->update_covariances();
+    report.marginals_by = engine_->problem().update_covariances();
     report.seconds.marginals += seconds_since(covariances_begin);
   }
   note_gauge(report);
@@ -135,9 +135,9 @@ UpdateReport IncrementalCholesky::carry_out(const GraphUpdate& update,
 
 /// Before a solution: whether there is one.
 void IncrementalCholesky::look_for_freedom() {
-  if (engine_->has_waiting()) return;
+  if (engine_->problem().waiting() > 0) return;
   if (std::exchange(watched_load_, engine_->loads()) != engine_->loads()) watch_.forget();
-  engine_->settle_gauge();
+  engine_->problem().settle_gauge();
   const auto jacobian = [this](int f, std::span<double> J) {
     const Graph& graph = engine_->graph();
     const FactorType& type = graph.factor_type(f);
@@ -172,8 +172,8 @@ void IncrementalCholesky::look_for_freedom() {
       evaluate();
   };
   watch_.look({.graph = engine_->graph(),
-               .held = [this](int v) { return engine_->held(v); },
-               .live = [this](int f) { return engine_->live_factor(f); },
+               .held = [this](int v) { return engine_->problem().held(v); },
+               .live = [this](int f) { return engine_->problem().live_factor(f); },
                .jacobian = jacobian});
   engine_->set_undetermined(!watch_.free().empty());
 }
@@ -235,7 +235,7 @@ class IncrementalCholesky::Target final : public UpdateTarget {
   Target(IncrementalCholesky& owner, std::optional<Elimination> foreseen)
       : owner_(owner), engine_(*owner.engine_), foreseen_(std::move(foreseen)) {}
 
-  Graph& graph() override { return engine_.edit(); }
+  Graph& graph() override { return engine_.problem().edit(); }
   FactorId next_factor() const override { return engine_.next_id(); }
   std::optional<int> position(FactorId id) const override { return owner_.position(id); }
   void added_variable() override {
@@ -246,13 +246,13 @@ class IncrementalCholesky::Target final : public UpdateTarget {
     engine_.added_factor();
     ++owner_.factors_;
   }
-  void changed_factor(int position) override { engine_.changed_factor(position); }
+  void changed_factor(int position) override { engine_.problem().change_factor(position); }
   Elimination eliminate(std::span<const int> variables) override;
   void remove(std::span<const int> factors, std::span<const int> variables) override;
 
  private:
   void remove_factor(int f) {
-    engine_.remove_factor(f);
+    engine_.problem().remove_factor(f);
     --owner_.factors_;
   }
 
@@ -263,7 +263,7 @@ class IncrementalCholesky::Target final : public UpdateTarget {
 
 Elimination IncrementalCholesky::Target::eliminate(std::span<const int> variables) {
   if (foreseen_) return std::move(*foreseen_);
-  engine_.settle_gauge();
+  engine_.problem().settle_gauge();
   return engine_.eliminate(variables);
 }
 
@@ -271,11 +271,11 @@ void IncrementalCholesky::Target::remove(std::span<const int> factors,
                                          std::span<const int> variables) {
   for (const int f : factors) remove_factor(f);
   for (const int v : variables) {
-    const std::vector<std::int32_t> on_it = engine_.factors_of(v);
+    const std::vector<std::int32_t> on_it = engine_.problem().factors_of(v);
     for (const std::int32_t f : on_it) remove_factor(f);
-    engine_.remove_variable(v);
+    engine_.problem().remove_variable(v);
     --owner_.variables_;
-    engine_.covariances().drop(v);
+    engine_.problem().covariances.drop(v);
   }
 }
 
@@ -339,25 +339,26 @@ bool IncrementalCholesky::brings_back(const GraphUpdate& update) const {
 
 /// Whether nothing else in the update changes what the marginalised variables leave.
 bool IncrementalCholesky::can_be_foreseen(const GraphUpdate& update) const {
-  if (!update.changed.empty() || engine_->gauge_is_old()) return false;
+  if (!update.changed.empty() || engine_->problem().gauge_is_old()) return false;
   return std::ranges::all_of(update.marginalized, [&](Id id) {
     const std::optional<int> v = find(id);
-    return v && !engine_->held(*v) && std::ranges::none_of(update.factors, [&](const Factor& f) {
+    return v && !engine_->problem().held(*v) &&
+           std::ranges::none_of(update.factors, [&](const Factor& f) {
              return std::ranges::find(f.variables, id) != f.variables.end();
            });
   });
 }
 
 void IncrementalCholesky::note_gauge(UpdateReport& report) {
-  for (const std::int32_t v : engine_->take_anchored()) {
-    if (!engine_->live_variable(v) || engine_->graph().fixed(v)) continue;
-    if (!engine_->held(v)) continue;  // what followed in the same update determines it
+  for (const std::int32_t v : engine_->problem().take_anchored()) {
+    if (!engine_->problem().live_variable(v) || engine_->graph().fixed(v)) continue;
+    if (!engine_->problem().held(v)) continue;  // what followed in the same update determines it
     if (!told_.insert(engine_->graph().id(v)).second) continue;
     report.notes.push_back(
         fmt::format("the pose of the component of {0} is not determined: anchored {0}",
                     engine_->graph().describe_variable(v)));
   }
-  for (const std::int32_t v : engine_->take_disconnected()) {
+  for (const std::int32_t v : engine_->problem().take_disconnected()) {
     if (engine_->graph().fixed(v)) continue;
     report.notes.push_back(fmt::format("{} has no factor left: it is constant, without covariance",
                                        engine_->graph().describe_variable(v)));
@@ -381,7 +382,7 @@ void IncrementalCholesky::set_loss(std::shared_ptr<const Loss> loss, const Facto
 
 std::optional<int> IncrementalCholesky::find(Id id) const {
   const auto v = engine().graph().find(id);
-  return v && engine_->live_variable(*v) ? v : std::nullopt;
+  return v && engine_->problem().live_variable(*v) ? v : std::nullopt;
 }
 
 int IncrementalCholesky::index(Id id) const {
@@ -390,14 +391,14 @@ int IncrementalCholesky::index(Id id) const {
 }
 
 std::optional<int> IncrementalCholesky::position(FactorId id) const {
-  const int place = engine().place_of(id);
+  const int place = engine().problem().place_of(id);
   return place < 0 ? std::nullopt : std::optional<int>(place);
 }
 
 std::vector<Id> IncrementalCholesky::variables() const {
   std::vector<Id> ids;
   for (int v = 0; v < engine().graph().variable_count(); ++v) {
-    if (engine_->live_variable(v)) ids.push_back(engine_->graph().id(v));
+    if (engine_->problem().live_variable(v)) ids.push_back(engine_->graph().id(v));
   }
   return ids;
 }
@@ -415,12 +416,12 @@ std::span<const double> IncrementalCholesky::state(Id id) {
   // Most read one variable after the other, in the order in which they have come.
   const Graph& graph = engine().graph();
   const bool next = next_to_read_ < graph.variable_count() && graph.id(next_to_read_) == id &&
-                    engine_->live_variable(next_to_read_);
+                    engine_->problem().live_variable(next_to_read_);
   const int v = next ? next_to_read_ : index(id);
   next_to_read_ = v + 1;
   // Where many are read, most likely all will be: together they are cheaper.
   if (!all_ && std::ssize(read_) >= kFew) all_ = engine_->current();
-  const auto size = static_cast<std::size_t>(engine_->states().ambient(v));
+  const auto size = static_cast<std::size_t>(engine_->problem().states.ambient(v));
   if (all_) return {all_->x(v), size};
   const auto known = read_.find(v);
   return known != read_.end() ? known->second : read_.emplace(v, engine_->x(v)).first->second;
@@ -431,14 +432,14 @@ int IncrementalCholesky::block_size(int a, int b) const {
 }
 
 void IncrementalCholesky::keep_marginals(KeptMarginals kept) {
-  engine().covariances().keep(kept);
+  engine().problem().covariances.keep(kept);
   kept_ = kept;
   if (record_)
     record_->steps.emplace_back([kept](IncrementalCholesky& also) { also.keep_marginals(kept); });
 }
 
 void IncrementalCholesky::keep_cross(Id a, Id b) {
-  engine().covariances().keep(index(a), index(b));
+  engine().problem().covariances.keep(index(a), index(b));
   if (record_)
     record_->steps.emplace_back([a, b](IncrementalCholesky& also) { also.keep_cross(a, b); });
 }
@@ -495,8 +496,8 @@ Engine& IncrementalCholesky::solved() {
     auto copy = std::make_unique<Engine>(*engine_);
     UpdateReport report;
     copy->solve(0.0, report);
-    if (report.ok && copy->up_to_date() && copy->covariances().keeps_anything())
-      copy->update_covariances();
+    if (report.ok && copy->up_to_date() && copy->problem().covariances.keeps_anything())
+      copy->problem().update_covariances();
     finished_ = std::move(copy);
   }
   return *finished_;
@@ -507,7 +508,7 @@ void IncrementalCholesky::reset() {
   lost_ = may_throw_ = false;
   record_.reset();
   engine_ = std::move(fresh);
-  engine_->covariances().keep(kept_);
+  engine_->problem().covariances.keep(kept_);
   variables_ = factors_ = since_solved_ = since_full_ = 0;
   has_removed_ = false;
   watch_.forget();

@@ -82,7 +82,7 @@ class IncrementalCholesky final : public Estimator {
   int factor_count() const override { return refuse_if_lost(), factors_; }
   std::vector<Id> variables() const override;
   std::shared_ptr<const VariableType> type(Id id) const override;
-  std::vector<FactorId> factors() const override { return engine().live_ids(); }
+  std::vector<FactorId> factors() const override { return engine().problem().live_ids(); }
   bool has_factor(FactorId id) const override { return position(id).has_value(); }
   Factor factor(FactorId id) const override;
   std::span<const double> state(Id id) override;
@@ -94,7 +94,7 @@ class IncrementalCholesky final : public Estimator {
   bool covariance_column(Id id, std::span<const Id> variables, std::span<double> out) override;
   void reset() override;
   std::unique_ptr<Estimator> clone() const override;
-  std::int64_t memory() const override { return engine().doubles() * 8; }
+  std::int64_t memory() const override { return engine().problem().doubles() * 8; }
   /// The clock that limits refer to, for tests.
   void set_clock(Pace::Clock clock) { engine().set_clock(std::move(clock)); }
 

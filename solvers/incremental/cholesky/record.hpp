@@ -25,7 +25,7 @@ struct IncrementalCholesky::Record {
 
   /// Whether to begin anew from a copy costs no more than what was recorded.
   bool is_long() const {
-    const auto bytes = static_cast<std::size_t>(8 * before->engine_->doubles());
+    const auto bytes = static_cast<std::size_t>(8 * before->engine_->problem().doubles());
     const auto variables = static_cast<std::size_t>(before->variables_);
     return answers.bytes() > std::max(kBytes, bytes) ||
            steps.size() > std::max(kSteps, variables / 4);

@@ -28,6 +28,9 @@ void clear_own(System& system, const Node& node) {
   for (const std::int32_t v : node.own_variables()) std::fill_n(system.g(v), system.size(v), 0.0);
 }
 
+/// Doubles for the rows of a front and those of its own variables, eight side by side.
+std::int64_t room_of(const Node& node) { return std::int64_t{node.stride + node.columns} * 8; }
+
 /// Doubles that substitution reads of a node; the number of nodes counts as well.
 double work_of(const Node& node) {
   constexpr double kNode = 300.0;
@@ -55,18 +58,13 @@ void Steps::clear(const System& system) {
   changed.clear();
 }
 
-void Substitution::make_room(const Node& node) {
-  const std::int64_t room = std::int64_t{node.stride + node.columns} * 8;
-  if (std::ssize(front_) < room) front_.resize(static_cast<std::size_t>(room));
-}
-
 // --- one right-hand side ---
 
 /// Solves for a node's own variables, given y (null: zero) and what it owes, and hands the steps of
 /// its front on to its children.
 void Substitution::solve_node(const System& system, Tree& tree, Node& node, const double* y,
                               Steps& steps) {
-  make_room(node);
+  make_room(room_of(node));
   double* const front = front_.data();
   double* const own = front + node.stride;
   if (y) {
@@ -202,13 +200,15 @@ void Substitution::drop_deferred(Tree& tree) {
 void Substitution::collect_paths(const Tree& tree, std::span<const std::int32_t> sources) {
   path_.clear();
   on_path_.resize(tree.nodes().size(), 0);
+  std::int64_t room = 0;
   for (const std::int32_t v : sources) {
     for (std::int32_t n = tree.node_of(v); n >= 0 && !on_path_[n]; n = tree.nodes()[n].parent) {
       on_path_[n] = 1;
       path_.push_back(n);
-      make_room(tree.nodes()[n]);
+      room = std::max(room, room_of(tree.nodes()[n]));
     }
   }
+  make_room(room);
   for (const std::int32_t n : path_) on_path_[n] = 0;
   std::ranges::sort(path_, {}, [&](std::int32_t n) { return tree.nodes()[n].sequence; });
 }
@@ -240,7 +240,7 @@ void Substitution::forward_many(const System& system, const Tree& tree,
 
 void Substitution::backward_many(const System& system, const Tree& tree, const Node& node,
                                  AlignedVector& X) {
-  make_room(node);
+  make_room(room_of(node));
   double* own = front_.data();
   double* front = own + std::int64_t{node.columns} * 8;
   gather_own(system, node, X.data(), 8, own);

@@ -92,7 +92,9 @@ class Substitution {
  private:
   void collect_paths(const Tree& tree, std::span<const std::int32_t> sources);
   void begin_at_roots(const Tree& tree);
-  void make_room(const Node& node);
+  void make_room(std::int64_t doubles) {
+    if (std::ssize(front_) < doubles) front_.resize(static_cast<std::size_t>(doubles));
+  }
   void solve_node(const System& system, Tree& tree, Node& node, const double* y, Steps& steps);
   void backward_many(const System& system, const Tree& tree, const Node& node, AlignedVector& X);
 

@@ -59,7 +59,7 @@ class KeptCovariances : public testing::TestWithParam<Case> {
     engine.solve(0.0, report);
     EXPECT_TRUE(report.ok);
     relinearized_ = report.relinearized_factors;
-    return engine.update_covariances();
+    return engine.problem().update_covariances();
   }
 
   Registry registry_;
@@ -69,18 +69,19 @@ class KeptCovariances : public testing::TestWithParam<Case> {
 
 /// The block of two variables in the inverse; zero where one is held.
 MatrixXd block_of(const Engine& engine, const MatrixXd& Sigma, int a, int b) {
-  const System& system = engine.system();
-  if (engine.held(a) || engine.held(b)) return MatrixXd::Zero(system.size(a), system.size(b));
+  const System& system = engine.problem().system;
+  if (engine.problem().held(a) || engine.problem().held(b))
+    return MatrixXd::Zero(system.size(a), system.size(b));
   return Sigma.block(system.offset(a), system.offset(b), system.size(a), system.size(b));
 }
 
 /// A block of the inverse, which is in the variables' frames, as seen from the poses.
 MatrixXd seen_from_poses(Engine& engine, MatrixXd block, int a, int b) {
   const auto turn = [&](int v) -> MatrixXd {
-    const int size = engine.system().size(v);
+    const int size = engine.problem().system.size(v);
     MatrixXd T = MatrixXd::Identity(size, size);
-    if (engine.states().type(v).lie_group())
-      engine.states().frame_to_body(v, engine.x(v).data(), T.data());
+    if (engine.problem().states.type(v).lie_group())
+      engine.problem().states.frame_to_body(v, engine.x(v).data(), T.data());
     return T;
   };
   return turn(a) * block * turn(b).transpose();
@@ -88,20 +89,20 @@ MatrixXd seen_from_poses(Engine& engine, MatrixXd block, int a, int b) {
 
 void expect_kept(Engine& engine, const std::vector<std::pair<int, int>>& crosses,
                  double tolerance) {
-  const System& system = engine.system();
+  const System& system = engine.problem().system;
   for (int v = 0; v < system.variables(); ++v) {
-    if (engine.live_variable(v)) {
-      ASSERT_EQ(engine.tree().node_of(v) < 0, engine.held(v)) << v;
+    if (engine.problem().live_variable(v)) {
+      ASSERT_EQ(engine.problem().tree.node_of(v) < 0, engine.problem().held(v)) << v;
     }
   }
-  const MatrixXd Sigma = test::inverse_of(dense(system, engine.tree()));
+  const MatrixXd Sigma = test::inverse_of(dense(system, engine.problem().tree));
   double largest = 0.0;
   for (int v = 0; v < system.variables(); ++v) {
-    if (engine.live_variable(v))
+    if (engine.problem().live_variable(v))
       largest = std::max(largest, block_of(engine, Sigma, v, v).cwiseAbs().maxCoeff());
   }
   const auto expect = [&](int a, int b) {
-    const double* kept = engine.covariances().kept(a, b);
+    const double* kept = engine.problem().covariances.kept(a, b);
     ASSERT_NE(kept, nullptr) << a << ' ' << b;
     const MatrixXd wanted = block_of(engine, Sigma, a, b);
     const Eigen::Map<const MatrixXd> block(kept, wanted.rows(), wanted.cols());
@@ -112,10 +113,10 @@ void expect_kept(Engine& engine, const std::vector<std::pair<int, int>>& crosses
     EXPECT_LE((asked - seen).cwiseAbs().maxCoeff(), 10.0 * tolerance * largest) << a << ' ' << b;
   };
   for (int v = 0; v < system.variables(); ++v) {
-    if (engine.live_variable(v)) expect(v, v);
+    if (engine.problem().live_variable(v)) expect(v, v);
   }
   for (const auto& [a, b] : crosses) {
-    if (engine.live_variable(a) && engine.live_variable(b)) expect(a, b);
+    if (engine.problem().live_variable(a) && engine.problem().live_variable(b)) expect(a, b);
   }
 }
 
@@ -123,7 +124,7 @@ TEST_P(KeptCovariances, AreThoseOfTheSystemAfterEveryChange) {
   std::map<MarginalsBy, int> by;
   for (unsigned seed = 1; seed <= 6; ++seed) {
     Engine engine({}, rescuer_);
-    engine.covariances().keep(KeptMarginals::diagonal);
+    engine.problem().covariances.keep(KeptMarginals::diagonal);
     GrowingGraph graph(GetParam().types, GetParam().happenings, seed);
     std::mt19937 rng(seed);
     std::set<std::pair<Id, Id>> crosses;
@@ -133,11 +134,11 @@ TEST_P(KeptCovariances, AreThoseOfTheSystemAfterEveryChange) {
         const auto any = [&] {
           const int v =
               static_cast<int>(rng() % static_cast<unsigned>(engine.graph().variable_count()));
-          return engine.live_variable(v) ? v : -1;
+          return engine.problem().live_variable(v) ? v : -1;
         };
         const int a = any(), b = any();
         if (a >= 0 && b >= 0 && a != b) {
-          engine.covariances().keep(a, b);
+          engine.problem().covariances.keep(a, b);
           crosses.insert({engine.graph().id(a), engine.graph().id(b)});
         }
       }
@@ -161,7 +162,7 @@ TEST_P(KeptCovariances, AreThoseOfTheSystemAfterEveryChange) {
 
 TEST_P(KeptCovariances, AreDowndatedForFewFactorsAndRecomputedForMany) {
   Engine engine({}, rescuer_);
-  engine.covariances().keep(KeptMarginals::diagonal);
+  engine.problem().covariances.keep(KeptMarginals::diagonal);
   GrowingGraph graph(GetParam().types, {}, 3);
   for (int k = 0; k < 40; ++k) graph.add_pose(engine);
   EXPECT_EQ(solve(engine), MarginalsBy::recomputation) << "there was nothing to start from";
@@ -185,7 +186,7 @@ TEST_P(KeptCovariances, AreDowndatedForFewFactorsAndRecomputedForMany) {
   // Near the minimum, what was linearised first does until it is linearised there.
   EXPECT_EQ(report.relinearized_factors, 2 * engine.graph().factor_count());
   EXPECT_GT(report.iterations, 2);
-  EXPECT_EQ(engine.update_covariances(), MarginalsBy::recomputation);
+  EXPECT_EQ(engine.problem().update_covariances(), MarginalsBy::recomputation);
   expect_kept(engine, {}, 1e-9);
 }
 
@@ -196,16 +197,16 @@ TEST_P(KeptCovariances, AreSolvedForWhereTheyAreNotKept) {
     graph.grow(engine);
     EXPECT_EQ(solve(engine), MarginalsBy::none);
   }
-  const MatrixXd Sigma = test::inverse_of(dense(engine.system(), engine.tree()));
-  const int n = engine.system().variables();
+  const MatrixXd Sigma = test::inverse_of(dense(engine.problem().system, engine.problem().tree));
+  const int n = engine.problem().system.variables();
   std::vector<std::int32_t> rows;
   for (int v = 0; v < n; ++v) {
-    if (engine.live_variable(v)) rows.push_back(v);
+    if (engine.problem().live_variable(v)) rows.push_back(v);
   }
   for (const std::int32_t b : rows) {
     Eigen::Index height = 0;
-    for (const std::int32_t a : rows) height += engine.system().size(a);
-    MatrixXd column(height, engine.system().size(b));
+    for (const std::int32_t a : rows) height += engine.problem().system.size(a);
+    MatrixXd column(height, engine.problem().system.size(b));
     ASSERT_TRUE(engine.covariance_column(rows, b, column.data()));
     Eigen::Index row = 0;
     for (const std::int32_t a : rows) {
@@ -224,7 +225,7 @@ TEST_P(KeptCovariances, AreSolvedForWhereTheyAreNotKept) {
 // size.
 TEST_P(KeptCovariances, OfALongWalkAreRightWhereDowndatesLeaveThemOut) {
   Engine engine({}, rescuer_);
-  engine.covariances().keep(KeptMarginals::diagonal);
+  engine.problem().covariances.keep(KeptMarginals::diagonal);
   GrowingGraph graph(GetParam().types, {.noise = 0.003}, 5);
   int downdates = 0;
   for (int k = 0; k < 160; ++k) {
@@ -233,11 +234,11 @@ TEST_P(KeptCovariances, OfALongWalkAreRightWhereDowndatesLeaveThemOut) {
     downdates += solve(engine) == MarginalsBy::downdate;
   }
   EXPECT_GT(downdates, 120);
-  const MatrixXd Sigma = test::inverse_of(dense(engine.system(), engine.tree()));
-  for (int v = 0; v < engine.system().variables(); ++v) {
-    if (engine.held(v)) continue;
+  const MatrixXd Sigma = test::inverse_of(dense(engine.problem().system, engine.problem().tree));
+  for (int v = 0; v < engine.problem().system.variables(); ++v) {
+    if (engine.problem().held(v)) continue;
     const MatrixXd wanted = block_of(engine, Sigma, v, v);
-    const Eigen::Map<const MatrixXd> kept(engine.covariances().kept(v, v), wanted.rows(),
+    const Eigen::Map<const MatrixXd> kept(engine.problem().covariances.kept(v, v), wanted.rows(),
                                           wanted.cols());
     EXPECT_LE((kept - wanted).norm(), 1e-8 * wanted.norm()) << v;
   }
@@ -246,7 +247,7 @@ TEST_P(KeptCovariances, OfALongWalkAreRightWhereDowndatesLeaveThemOut) {
 // Where a loop says much more than was known, U has lost its digits.
 TEST_P(KeptCovariances, AreRecomputedWhereADowndateIsGivenUp) {
   Engine engine({}, rescuer_);
-  engine.covariances().keep(KeptMarginals::diagonal);
+  engine.problem().covariances.keep(KeptMarginals::diagonal);
   GrowingGraph graph(GetParam().types, {}, 6);
   for (int round = 0; round < 4; ++round) {
     for (int k = 0; k < 15; ++k) graph.add_pose(engine);

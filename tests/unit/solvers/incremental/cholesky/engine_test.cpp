@@ -128,10 +128,11 @@ TEST_P(EngineOnGrowingGraphs, TakesNoRoundingForSomethingToBeSolved) {
         group.exp(delta.data(), step.data());
         group.compose(x.data(), step.data(), x.data());
       }
-      engine.edit().add_variable(types.pose, k, x);
+      engine.problem().edit().add_variable(types.pose, k, x);
       engine.added_variable();
       if (k == 0) continue;
-      engine.edit().add_factor(types.relative_pose, std::array{k - 1, k}, step, information);
+      engine.problem().edit().add_factor(types.relative_pose, std::array{k - 1, k}, step,
+                                         information);
       engine.added_factor();
       UpdateReport report;
       engine.solve(0.0, report);
@@ -147,7 +148,7 @@ TEST_P(EngineOnGrowingGraphs, TakesNoRoundingForSomethingToBeSolved) {
 std::vector<double> states_of(Engine& engine) {
   std::vector<double> states;
   for (int v = 0; v < engine.graph().variable_count(); ++v) {
-    if (!engine.live_variable(v)) continue;
+    if (!engine.problem().live_variable(v)) continue;
     const std::vector<double> x = engine.x(v);
     states.insert(states.end(), x.begin(), x.end());
   }
@@ -157,13 +158,13 @@ std::vector<double> states_of(Engine& engine) {
 TEST_P(EngineOnGrowingGraphs, ACopyGoesItsOwnWayAndTheSameIfToldTheSame) {
   for (unsigned seed = 1; seed <= 3; ++seed) {
     Engine engine({}, rescuer_);
-    engine.covariances().keep(KeptMarginals::diagonal);
+    engine.problem().covariances.keep(KeptMarginals::diagonal);
     GrowingGraph graph(GetParam().types, GetParam().happenings, seed);
     const auto step = [](GrowingGraph& growing, Engine& of) {
       growing.grow(of);
       UpdateReport report;
       of.solve(0.0, report);
-      of.update_covariances();
+      of.problem().update_covariances();
     };
     for (int k = 0; k < 30; ++k) step(graph, engine);
     Engine copy(engine), third(engine);
@@ -173,13 +174,14 @@ TEST_P(EngineOnGrowingGraphs, ACopyGoesItsOwnWayAndTheSameIfToldTheSame) {
       return states_of(copy_of);
     };
     const std::vector<double> before = settled(engine);
-    const double determinant = engine.tree().log_determinant();
+    const double determinant = engine.problem().tree.log_determinant();
     for (int k = 0; k < 10; ++k) step(copy_of_graph, copy);
     EXPECT_EQ(settled(engine), before) << "seed " << seed;
-    EXPECT_EQ(engine.tree().log_determinant(), determinant) << "seed " << seed;
+    EXPECT_EQ(engine.problem().tree.log_determinant(), determinant) << "seed " << seed;
     for (int k = 0; k < 10; ++k) step(graph, engine);
     EXPECT_EQ(settled(engine), settled(copy)) << "seed " << seed;
-    EXPECT_EQ(engine.tree().log_determinant(), copy.tree().log_determinant()) << "seed " << seed;
+    EXPECT_EQ(engine.problem().tree.log_determinant(), copy.problem().tree.log_determinant())
+        << "seed " << seed;
     EXPECT_EQ(settled(third), before) << "seed " << seed;
   }
 }

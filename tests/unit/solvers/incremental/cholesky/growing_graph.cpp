@@ -145,32 +145,32 @@ void GrowingGraph::add_prior(Engine& engine) {
 }
 
 void GrowingGraph::change_measurement(Engine& engine) {
-  std::erase_if(loops_, [&](FactorId id) { return engine.place_of(id) < 0; });
+  std::erase_if(loops_, [&](FactorId id) { return engine.problem().place_of(id) < 0; });
   if (loops_.empty()) return;
-  const int f = engine.place_of(loops_[rng_() % loops_.size()]);
+  const int f = engine.problem().place_of(loops_[rng_() % loops_.size()]);
   log_ += fmt::format("change {}\n", engine.graph().describe_factor(f));
   const auto old = engine.graph().measurement(f);
-  engine.edit().set_measurement(f, noisy({old.begin(), old.end()}));
-  engine.changed_factor(f);
+  engine.problem().edit().set_measurement(f, noisy({old.begin(), old.end()}));
+  engine.problem().change_factor(f);
 }
 
 void GrowingGraph::remove(Engine& engine) {
-  std::erase_if(loops_, [&](FactorId id) { return engine.place_of(id) < 0; });
-  const std::vector<FactorId> factors = engine.live_ids();
+  std::erase_if(loops_, [&](FactorId id) { return engine.problem().place_of(id) < 0; });
+  const std::vector<FactorId> factors = engine.problem().live_ids();
   if (happenings_.cuts && chance(0.5)) {
     remove_variable(engine, poses_);
   } else if (happenings_.cuts && !factors.empty() && chance(0.5)) {
-    remove_factor(engine, engine.place_of(factors[rng_() % factors.size()]));
+    remove_factor(engine, engine.problem().place_of(factors[rng_() % factors.size()]));
   } else if (!points_.empty() && chance(0.3)) {
     remove_variable(engine, points_);
   } else if (!loops_.empty()) {
-    remove_factor(engine, engine.place_of(loops_[rng_() % loops_.size()]));
+    remove_factor(engine, engine.problem().place_of(loops_[rng_() % loops_.size()]));
   }
 }
 
 void GrowingGraph::remove_factor(Engine& engine, int f) {
   log_ += fmt::format("remove {}\n", engine.graph().describe_factor(f));
-  engine.remove_factor(f);
+  engine.problem().remove_factor(f);
 }
 
 /// Any of these, with all factors on it.
@@ -179,17 +179,17 @@ void GrowingGraph::remove_variable(Engine& engine, std::vector<Variable>& variab
   const int v = *engine.graph().find(leaves->id);
   variables.erase(leaves);
   log_ += fmt::format("remove {}\n", engine.graph().describe_variable(v));
-  const std::vector<std::int32_t> factors = engine.factors_of(v);
-  for (const std::int32_t f : factors) engine.remove_factor(f);
-  engine.remove_variable(v);
-  engine.covariances().drop(v);
+  const std::vector<std::int32_t> factors = engine.problem().factors_of(v);
+  for (const std::int32_t f : factors) engine.problem().remove_factor(f);
+  engine.problem().remove_variable(v);
+  engine.problem().covariances.drop(v);
 }
 
 int GrowingGraph::add_variable(Engine& engine, const std::shared_ptr<const VariableType>& type,
                                const State& x, bool fixed) {
   log_ += fmt::format("add {}{}\n", next_id_, fixed ? ", fixed" : "");
-  const int v = engine.edit().add_variable(type, next_id_++, x);
-  if (fixed) engine.edit().set_fixed(v);
+  const int v = engine.problem().edit().add_variable(type, next_id_++, x);
+  if (fixed) engine.problem().edit().set_fixed(v);
   engine.added_variable();
   return v;
 }
@@ -204,7 +204,8 @@ void GrowingGraph::add_factor(Engine& engine, const std::shared_ptr<const Factor
       information.push_back((row == column ? uniform(0.5, 2.0) : uniform(-0.05, 0.05)) * 1e3 *
                             information_factor);
   }
-  const int f = engine.edit().add_factor(type, std::vector<int>(variables), z, information);
+  const int f =
+      engine.problem().edit().add_factor(type, std::vector<int>(variables), z, information);
   log_ += fmt::format("{} as {}\n", engine.graph().describe_factor(f), engine.next_id());
   engine.added_factor();
 }

@@ -132,7 +132,7 @@ class EngineThatComesAlongAgain : public testing::Test {
   /// What has been prepared has come from something, and has lost nothing.
   static void expect_prepared(const Engine& engine) {
     EXPECT_GT(engine.prepared(), 10);
-    EXPECT_EQ(engine.tree().unsettled(), 0);
+    EXPECT_EQ(engine.problem().tree.unsettled(), 0);
   }
 
   Registry registry_;
@@ -222,7 +222,7 @@ TEST_F(EngineThatComesAlongAgain, ACopyGoesOnAsTheOriginalDoes) {
   GrowingGraph copy_of_graph = graph;
   for (int step = 103; step < 160; ++step)
     EXPECT_EQ(step_of(graph, engine), step_of(copy_of_graph, copy));
-  EXPECT_EQ(engine.tree().log_determinant(), copy.tree().log_determinant());
+  EXPECT_EQ(engine.problem().tree.log_determinant(), copy.problem().tree.log_determinant());
   EXPECT_EQ(engine.prepared(), copy.prepared());
   expect_prepared(engine);
 }

@@ -3,7 +3,9 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <string_view>
+#include <vector>
+
+#include "damping.hpp"
 
 namespace cairn::incremental {
 
@@ -11,10 +13,11 @@ namespace cairn::incremental {
 ///
 /// A *round* orders and factorises what has changed, steps, and evaluates the factors that have
 /// moved; then it ends, or relinearises some factors or all and begins another one. If a round has
-/// raised chi2 too much the job goes on with damped rounds (Levenberg-Marquardt) of everything.
-struct Job {
+/// raised chi2 too much the solution goes on with damped rounds (Levenberg-Marquardt) of
+/// everything.
+struct Solution {
   enum class Stage : std::uint8_t {
-    none,  ///< there is no job
+    none,  ///< there is nothing to be solved
     order,
     factorize,
     // A step:
@@ -37,32 +40,21 @@ struct Job {
   Stage stage = Stage::none;
   std::size_t next = 0;  ///< what the stage is to go on with
   int rounds = 0;
-  double at_first = 0.0;   ///< the cost before the job, …
-  double before = 0.0;     ///< … and before the round
-  double tolerance = 0.0;  ///< of the step, see `Tree::solve`
-  double expected = 0.0;   ///< the cost after it, by the models
-  double square = 0.0;     ///< of the mismatches, summed over …
-  int compared = 0;        ///< … so many factors
+  double at_first = 0.0;   ///< the cost before the solution
+  double before = 0.0;     ///< and before the round
+  double tolerance = 0.0;  ///< of the step, see `Substitution::descend`
   int factors = 0;         ///< that it is about
   bool unproven = false;   ///< the estimate has moved, and chi2 was not evaluated since
-
-  // Damped rounds:
-  enum class Damped : std::uint8_t {
-    no,
-    begun,  ///< everything is linearised where the last estimate that was accepted is
-    tried,  ///< … or after a step from there
-    last    ///< it has converged: H as it is
-  };
-  Damped damped = Damped::no;
-  double lambda = 0.0;
-  double growth = 2.0;          ///< of lambda, if the next step is rejected
-  bool undamped_fails = false;  ///< has raised chi2 before
-  bool converged = true;
+  Damping damping{};
+  std::vector<std::int32_t> looked_at{};  ///< factors of the last evaluation
+  std::vector<double> gradients{};        ///< g of the sources after it, one after the other
+  std::size_t next_gradient = 0;          ///< in `set_aside`
 
   void go_to(Stage other) {
     stage = other;
     next = 0;
   }
+  bool busy() const { return stage != Stage::none; }
 };
 
 }  // namespace cairn::incremental
