@@ -54,9 +54,9 @@ void NewestCovariances::prepare(std::span<const int> poses, const KeptPoses& kep
 
 void NewestCovariances::know_anchor(const KeptPoses& kept) {
   if (anchored_version_ == version_) return;
-  anchored_version_ = version_;
-  S_aa_ = kept.covariance(anchor_, anchor_);
   known_ = false;
+  S_aa_ = kept.covariance(anchor_, anchor_);
+  anchored_version_ = version_;  // not where there is no covariance
 }
 
 /// A and Σ_nn of the newest pose, from the anchor's Σ_aa.
