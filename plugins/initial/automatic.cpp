@@ -24,8 +24,10 @@
 namespace cairn::initial {
 namespace {
 
-/// Where no pose disagrees with a relative measurement by a larger angle, chi2 is so nearly convex
-/// that no other start ends elsewhere, and most take more time. [rad]
+/// Where no pose disagrees by a larger angle, neither with a relative measurement nor with all of
+/// them on the way to it, no loop closure is off by the half of a turn that divides minima: no
+/// other start ends elsewhere, and most take more time. (States that are all alike disagree with no
+/// single measurement by much.) [rad]
 constexpr double kAgreement = 0.5;
 
 bool is_of_relative_poses_alone(const Graph& graph) {
@@ -146,7 +148,7 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
     if (!can_place(graph)) return {};
     if (is_of_relative_poses_alone(graph)) {
       const double turn = largest_turn(graph);
-      if (turn <= kAgreement) {
+      if (turn <= kAgreement && largest_drift(graph) <= kAgreement) {
         agreed_ = true;
         return {fmt::format("{}: no measurement disagrees with its angles by more than {:.2g} rad",
                             best.in_words(), turn)};

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <random>
 #include <utility>
@@ -352,6 +353,40 @@ double largest_turn(const Graph& graph) {
       // The trace of from · measured · toᵀ.
       least = std::min(least, (from.transpose() * to).cwiseProduct(measured.R).sum());
     }
+  }
+  return std::acos(std::clamp(0.5 * (least - 1.0), -1.0, 1.0));
+}
+
+double largest_drift(const Graph& graph) {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  struct Step {
+    int from = -1;
+    Eigen::Matrix3d R;
+  };
+  std::vector<Step> steps(static_cast<std::size_t>(graph.variable_count()));
+  for (const FactorPool& pool : graph.factor_pools()) {
+    if (!pool.type->is_relative()) continue;
+    for (std::size_t f = 0; f < pool.size(); ++f) {
+      const int a = pool.variables[2 * f], b = pool.variables[2 * f + 1];
+      const VariableType& type = graph.type(a);
+      if (!is_pose(type)) return kNone;
+      Step& step = steps[static_cast<std::size_t>(std::max(a, b))];
+      if (std::min(a, b) <= step.from) continue;
+      const auto size = static_cast<std::size_t>(type.ambient_size());
+      const Eigen::Matrix3d R = pose_of(*type.placement(), pool.measurements.data() + f * size).R;
+      step.from = std::min(a, b);
+      step.R = a < b ? R : Eigen::Matrix3d(R.transpose());
+    }
+  }
+  std::vector<Eigen::Matrix3d> reckoned;
+  double least = 3.0;  // as in `largest_turn`
+  for (int v = 0; v < graph.variable_count(); ++v) {
+    if (!is_pose(graph.type(v))) return kNone;
+    const Eigen::Matrix3d given = pose_of(*graph.type(v).placement(), graph.state(v).data()).R;
+    const Step& step = steps[static_cast<std::size_t>(v)];
+    if (v > 0 && step.from < 0) return kNone;
+    reckoned.push_back(v == 0 ? given : reckoned[static_cast<std::size_t>(step.from)] * step.R);
+    least = std::min(least, reckoned.back().cwiseProduct(given).sum());
   }
   return std::acos(std::clamp(0.5 * (least - 1.0), -1.0, 1.0));
 }

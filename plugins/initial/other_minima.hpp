@@ -76,6 +76,11 @@ OtherMinima search_other_minima(Graph& graph, const std::vector<NamedStart>& sta
 /// The largest angle by which the poses of a relative measurement disagree with it [rad].
 double largest_turn(const Graph& graph);
 
+/// The largest angle [rad] by which a pose is turned from where the relative measurements that join
+/// each pose to the nearest one before it, such as odometry, lead from the first. Infinite where a
+/// variable is joined to none before it, or is no pose.
+double largest_drift(const Graph& graph);
+
 /// Whether the graph has few variables, and `angle`, its largest turn, is large for that.
 bool few_that_disagree(const Graph& graph, double angle);
 

@@ -87,6 +87,16 @@ TEST_F(Automatic, TriesNothingWhereTheGivenAnglesAgreeWithAllMeasurements) {
   EXPECT_NEAR(optimize(graph).final_chi2, expected, 1e-9 * expected);
 }
 
+// Around a circle of a hundred steps all states at the origin disagree with each measurement by
+// little, and end in a minimum without the turn.
+TEST_F(Automatic, LooksForAnotherStartThanStatesThatAreAllAlike) {
+  Graph graph = std::move(simulate("ring:poses=100").graph), right = graph.clone();
+  for (int v = 0; v < graph.variable_count(); ++v) graph.set_state(v, std::vector(3, 0.0));
+  EXPECT_THAT(guess("auto", graph), Contains(StartsWith("chordal")));
+  const double expected = optimize(right).final_chi2;
+  EXPECT_NEAR(optimize(graph).final_chi2, expected, 1e-6 * expected);
+}
+
 TEST_F(Automatic, FindsTheMinimumWhereTheGivenStatesEndInAnother) {
   // With this much noise in the headings, steps from odometry end in a local minimum.
   Graph graph = std::move(simulate("manhattan:poses=1500,rotation_sigma=0.1").graph);

@@ -174,10 +174,13 @@ TEST_F(OptimizeCommand, ALossOnLoopsTamesOutliers) {
 
 TEST_F(OptimizeCommand, TheResultsShowWhichStartWasTakenAndWhatDecided) {
   if (!Registry().has("initial_guess", "auto")) GTEST_SKIP() << "there is no initial guess auto";
-  const Outcome run = cairn({"optimize", graph(), "--quiet"});
+  const Outcome run = cairn({"optimize", "@manhattan:poses=400,rotation_sigma=0.1", "--quiet"});
   EXPECT_EQ(run.exit_code, 0);
   EXPECT_THAT(unfolded(run.out), HasSubstr("start chordal (chi2 "));
   EXPECT_THAT(unfolded(run.out), HasSubstr("; not as_given (chi2 "));
+  const Outcome near = cairn({"optimize", graph(), "--quiet"});
+  EXPECT_THAT(unfolded(near.out), HasSubstr("start as_given (chi2 "));
+  EXPECT_THAT(unfolded(near.out), HasSubstr("no measurement disagrees with its angles"));
 }
 
 TEST_F(OptimizeCommand, SaysHowManyLoopClosuresALossRejectsAndThatNoFileHasIt) {
