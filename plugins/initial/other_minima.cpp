@@ -332,8 +332,15 @@ OtherMinima search_other_minima(Graph& graph, const std::vector<NamedStart>& sta
   return Search(graph, optimizers, wanted).run(starts);
 }
 
+namespace {
+
+/// Of a rotation, by its trace 1 + 2 cos(angle).
+double angle_of(double trace) { return std::acos(std::clamp(0.5 * (trace - 1.0), -1.0, 1.0)); }
+
+}  // namespace
+
 double largest_turn(const Graph& graph) {
-  double least = 3.0;  // the trace of a rotation by an angle: 1 + 2 cos(angle)
+  double least = 3.0;  // trace
   std::vector<std::vector<Eigen::Matrix3d>> rotations(graph.variable_pools().size());
   for (const FactorPool& pool : graph.factor_pools()) {
     if (!pool.type->is_relative() || pool.size() == 0) continue;
@@ -354,7 +361,7 @@ double largest_turn(const Graph& graph) {
       least = std::min(least, (from.transpose() * to).cwiseProduct(measured.R).sum());
     }
   }
-  return std::acos(std::clamp(0.5 * (least - 1.0), -1.0, 1.0));
+  return angle_of(least);
 }
 
 double largest_drift(const Graph& graph) {
@@ -379,7 +386,7 @@ double largest_drift(const Graph& graph) {
     }
   }
   std::vector<Eigen::Matrix3d> reckoned;
-  double least = 3.0;  // as in `largest_turn`
+  double least = 3.0;  // trace
   for (int v = 0; v < graph.variable_count(); ++v) {
     if (!is_pose(graph.type(v))) return kNone;
     const Eigen::Matrix3d given = pose_of(*graph.type(v).placement(), graph.state(v).data()).R;
@@ -388,7 +395,7 @@ double largest_drift(const Graph& graph) {
     reckoned.push_back(v == 0 ? given : reckoned[static_cast<std::size_t>(step.from)] * step.R);
     least = std::min(least, reckoned.back().cwiseProduct(given).sum());
   }
-  return std::acos(std::clamp(0.5 * (least - 1.0), -1.0, 1.0));
+  return angle_of(least);
 }
 
 bool few_that_disagree(const Graph& graph, double angle) {

@@ -119,12 +119,12 @@ class FrontSteps {
       std::vector<Step> rows = tiles(Step::Kind::rows, begin, last, (last + 7) / 8 * 8);
       for (Step& tile : rows) tile.waits[1] = {pivots, 1};
       const bool ends_block = last % kBlockColumns == 0;
-      if (last < node_.columns && !ends_block) pivots = let_pivots_follow(rows.front(), last);
+      if (last < node_.columns && !ends_block) pivots = let_pivots_follow(rows.front());
       if (!rows.empty()) phase(std::move(rows));
       if (last == node_.columns || !ends_block) continue;
       std::vector<Step> subtract =
           tiles(Step::Kind::subtract, last, std::min(node_.columns, last + kBlockColumns), last);
-      pivots = let_pivots_follow(subtract.front(), last);
+      pivots = let_pivots_follow(subtract.front());
       phase(std::move(subtract));
     }
   }
@@ -140,10 +140,9 @@ class FrontSteps {
     }
     return steps;
   }
-  /// The gate of the pivots of the strip that begins at `column`.
-  std::int32_t let_pivots_follow(Step& tile, std::int32_t column) {
+  /// The gate of the pivots that are factored after a tile.
+  std::int32_t let_pivots_follow(Step& tile) {
     tile.pivots_follow = true;
-    tile.next = column;
     tile.signals[1] = gates_++;
     return tile.signals[1];
   }

@@ -25,7 +25,7 @@ struct Step {
     add_to_panel,  ///< children [child, child_end), or columns [begin, end) of a large child
     pivots,        ///< the diagonal block of columns [first, last)
     rows,          ///< rows [begin, end) below it; then the next strip's pivots, if `pivots_follow`
-    subtract,      ///< rows [begin, end) of columns [first, last), likewise
+    subtract,      ///< rows [begin, end) of columns [first, last); then their pivots, likewise
     update,        ///< rows [begin, end) of the update matrix
     add_to_update,  ///< as add_to_panel
     finish          ///< nothing: the supernode is done
@@ -34,10 +34,10 @@ struct Step {
     std::int32_t gate = -1, count = 0;
   };
   Kind kind = Kind::finish;
-  bool pivots_follow = false;  ///< of the strip that begins at `next`
-  std::int32_t which = 0;      ///< task or supernode
+  bool pivots_follow = false;
+  std::int32_t which = 0;  ///< task or supernode
   std::int32_t child = 0, child_end = 0;
-  std::int32_t first = 0, last = 0, next = 0;
+  std::int32_t first = 0, last = 0;
   std::int64_t begin = 0, end = 0;
   Wait waits[2];                                ///< until the gate has been signalled so often
   std::int32_t signals[2] = {-1, -1};           ///< gates, when done

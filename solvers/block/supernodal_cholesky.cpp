@@ -250,11 +250,11 @@ void SupernodalCholesky::run(const Step& step, const BlockMatrix& H, Numbers<Rea
     case Step::Kind::rows:
       numbers.kernels->factor_rows(panel, node.stride, block_of(step.first), step.first, step.last,
                                    begin, end);
-      if (step.pivots_follow) factor_pivots(numbers, s, step.next);
+      if (step.pivots_follow) factor_pivots(numbers, s, step.last);
       break;
     case Step::Kind::subtract:
       numbers.kernels->subtract(panel, node.stride, step.first, step.last, begin, end);
-      if (step.pivots_follow) factor_pivots(numbers, s, step.next);
+      if (step.pivots_follow) factor_pivots(numbers, s, step.first);
       break;
     case Step::Kind::update:
       numbers.kernels->update(panel, node.stride, node.columns, node.m,

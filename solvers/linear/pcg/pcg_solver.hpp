@@ -88,8 +88,9 @@ class PcgSolver final : public LinearSolver, public IterativeSolver, public Jaco
   void solve(std::span<const double> g, std::span<double> x) override;
   const LinearSolverStats& stats() const override { return stats_; }
   double tolerance() const override { return options_.tolerance; }
-  void set_forcing(double term) override {
+  bool set_forcing(double term) override {
     if (options_.inexact) forcing_ = term;
+    return options_.inexact;
   }
 
   void analyze(const JacobianStructure& structure) override;

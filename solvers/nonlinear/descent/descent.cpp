@@ -218,22 +218,22 @@ void Descent::choose_forcing() {
   auto* iterative = query<IterativeSolver>(solver_);
   if (!iterative || exact()) return;
   const double gradient = norm(equations_->g());
-  if (gradient != gradient_) {
-    const double ratio = gradient_ > 0.0 ? gradient / gradient_ : 1.0;
-    iterative->set_forcing(std::min(kLargestForcing, kForcing * ratio * ratio));
-    gradient_ = gradient;
-  }
+  if (gradient == gradient_) return;  // still at the same estimate
+  const double ratio = gradient_ > 0.0 ? gradient / gradient_ : 1.0;
+  is_forced_ = iterative->set_forcing(std::min(kLargestForcing, kForcing * ratio * ratio));
+  gradient_ = gradient;
 }
 
-/// What lowers the residual of a reduced system may not lower that of the whole.
+/// By a step that the forcing term allows, if it does: what lowers the residual of a reduced system
+/// may not lower that of the whole.
 void Descent::solve_inexactly(std::span<double> out) {
   choose_forcing();
   equations_->solve(out);
-  auto* iterative = query<IterativeSolver>(solver_);
-  if (!iterative || exact()) return;
+  if (!is_forced_) return;
   static_cast<void>(equations_->backward_error(out));
   if (relative_residual() <= kLargestResidual) return;
-  iterative->set_forcing(0.0);
+  query<IterativeSolver>(solver_)->set_forcing(0.0);
+  is_forced_ = false;
   equations_->solve(out);
 }
 
@@ -413,7 +413,7 @@ void Descent::end_undetermined() {
 }
 
 Summary Descent::finish() {
-  if (auto* iterative = query<IterativeSolver>(solver_)) iterative->set_forcing(0.0);
+  if (is_forced_) query<IterativeSolver>(solver_)->set_forcing(0.0);
   summary_.status = status_.value_or(Status::max_iterations);
   std::string departed = departures_.conclude(graph_, best_chi2_, chi2, summary_.status);
   if (!departed.empty()) note(std::move(departed));

@@ -169,6 +169,7 @@ class Descent {
   double state_extent_ = 0.0;
   double step_norm_ = 0.0;
   double gradient_ = 0.0;         // ‖g‖ of the last step
+  bool is_forced_ = false;        // an iterative solver has a forcing term
   std::vector<double> solution_;  // the last one as solved, where the step leaves something alone
   int sampled_ = 0;               // the last iteration whose step was checked
   bool reported_wrong_step_ = false;  // a note names the linear solver

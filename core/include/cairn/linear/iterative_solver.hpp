@@ -18,9 +18,9 @@ class CAIRN_API IterativeSolver {
   /// A solve ends when ‖Hx − g‖/‖g‖ is at most this, or at a limit of iterations.
   virtual double tolerance() const = 0;
   /// The forcing term of an inexact Newton method (Dembo, Eisenstat, Steihaug 1982): from now on a
-  /// solve may end at this ‖Hx − g‖/‖g‖ where that is more than the tolerance. 0 at first. Does
-  /// nothing unless a solver overrides it.
-  virtual void set_forcing(double /*term*/) {}
+  /// solve may end at this ‖Hx − g‖/‖g‖ where that is more than the tolerance. 0 at first. False,
+  /// and nothing changes, if the solver meets its tolerance all the same.
+  virtual bool set_forcing(double /*term*/) { return false; }
 };
 
 }  // namespace cairn

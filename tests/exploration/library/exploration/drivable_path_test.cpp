@@ -133,13 +133,16 @@ FloorMap room_and_corridor(int width = 10) {
               [=](int x, int y) { return x > 30 && (y < 16 - width / 2 || y >= 16 + width / 2); });
 }
 
+PlannedPath along_corridor() {
+  return {.points = {{4.0, 1.6}, {7.0, 1.6}}, .length = 3.0, .look_at = Vector2d(8.0, 1.6)};
+}
+
 TEST(DrivablePath, TurnsRoundWhereThereIsRoom) {
   const FloorMap map = room_and_corridor(6);
   const RobotModel robot = dubins_robot(0.5);
   // Heads for the room, and the goal is behind it.
   const Pose2 start(4.0, 1.6, pi);
-  const PlannedPath path{
-      .points = {{4.0, 1.6}, {7.0, 1.6}}, .length = 3.0, .look_at = Vector2d(8.0, 1.6)};
+  const PlannedPath path = along_corridor();
   const auto curve = drivable_path(path, start, robot, map);
   ASSERT_TRUE(curve);
   const Pose2 end = followed(start, *curve, robot, map);
@@ -155,8 +158,7 @@ TEST(DrivablePath, TurnsRoundByBackingWhereThatIsShorter) {
   const FloorMap map = room_and_corridor();
   const RobotModel robot = dubins_robot(0.5);
   const Pose2 start(4.0, 1.6, pi);
-  const PlannedPath path{
-      .points = {{4.0, 1.6}, {7.0, 1.6}}, .length = 3.0, .look_at = Vector2d(8.0, 1.6)};
+  const PlannedPath path = along_corridor();
   const auto curve = drivable_path(path, start, robot, map);
   ASSERT_TRUE(curve);
   EXPECT_FALSE(curve->cusps.empty());
@@ -194,8 +196,7 @@ TEST(DrivablePath, ThereIsNoneOnceTheSearchIsInterrupted) {
   const FloorMap map = room_and_corridor();
   const RobotModel robot = dubins_robot(0.5);
   const Pose2 start(4.0, 1.6, pi);
-  const PlannedPath path{
-      .points = {{4.0, 1.6}, {7.0, 1.6}}, .length = 3.0, .look_at = Vector2d(8.0, 1.6)};
+  const PlannedPath path = along_corridor();
   std::atomic<bool> interrupt = false;
   const auto curve = drivable_path(path, start, robot, map);
   const auto watched = drivable_path(path, start, robot, map, &interrupt);
