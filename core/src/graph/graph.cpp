@@ -473,12 +473,4 @@ std::int64_t Graph::residual_size() const {
   return total;
 }
 
-std::vector<std::vector<int>> factors_by_variable(const Graph& graph) {
-  std::vector<std::vector<int>> result(graph.variable_count());
-  for (int f = 0; f < graph.factor_count(); ++f) {
-    for (const std::int32_t v : graph.factor_variables(f)) result[v].push_back(f);
-  }
-  return result;
-}
-
 }  // namespace cairn

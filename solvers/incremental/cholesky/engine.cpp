@@ -32,7 +32,7 @@ Engine::Engine(const Settings& settings, std::shared_ptr<Rescuer> rescuer)
     : settings_(settings),
       rescuer_(std::move(rescuer)),
       problem_(kernels_named(settings.kernels)),
-      outlook_(settings.accuracy) {}
+      prediction_(settings.accuracy) {}
 
 // --- what is there ---
 
@@ -75,7 +75,7 @@ void Engine::added_variable() {
 void Engine::added_factor() {
   problem_.add_factor(next_id_++);
   if (busy()) {
-    followers_.note(problem_, problem_.models.size() - 1, [this](std::int32_t v) { return x(v); });
+    pending_.note(problem_, problem_.models.size() - 1, [this](std::int32_t v) { return x(v); });
   } else {
     problem_.admit_waiting();
   }
@@ -98,9 +98,9 @@ void Engine::set_loss(const std::shared_ptr<const Loss>& loss, const FactorSelec
 /// Starts from a whole graph, at its states.
 void Engine::load(Graph graph, std::span<const FactorId> ids) {
   problem_ = problem_.anew(std::move(graph), ids, answers_.get());
-  outlook_ = Outlook(settings_.accuracy);
+  prediction_ = CostPrediction(settings_.accuracy);
   solution_ = {};
-  followers_ = {};
+  pending_ = {};
   shown_.reset();
   broken_ = exhausted_ = false;
   ++loads_;
@@ -158,10 +158,10 @@ void Engine::optimize(Graph& graph, double tolerance, UpdateReport& report) {
 /// factor of where the estimate has converged.
 bool Engine::step_fully(UpdateReport& report) {
   for (int steps = 1;; ++steps) {
-    const double last = outlook_.decrease(), before = problem_.cost();
+    const double last = prediction_.decrease(), before = problem_.cost();
     step_and_look(report);
     ++report.iterations;
-    const double decrease = outlook_.decrease(), cost = problem_.cost();
+    const double decrease = prediction_.decrease(), cost = problem_.cost();
     if (decrease <= kExact * cost + problem_.rounding()) return steps == 1;
     const bool fast = decrease <= (steps == 1 ? kNear * cost : kFast * last);
     if (!fast || !(cost <= before + problem_.rounding())) return false;

@@ -15,10 +15,10 @@
 #include "cairn/solve/estimator.hpp"
 #include "cairn/solve/optimizer.hpp"
 #include "cairn/update/elimination.hpp"
+#include "cost_prediction.hpp"
 #include "factorization.hpp"
-#include "followers.hpp"
-#include "outlook.hpp"
 #include "pace.hpp"
+#include "pending_poses.hpp"
 #include "problem.hpp"
 #include "solution.hpp"
 
@@ -166,7 +166,7 @@ class Engine {
   void show_what_is_proven();
   bool negligible();
   bool usable_for(int v) const { return !broken_ || problem_.held(v); }
-  double cost() const { return outlook_.cost(problem_.cost()); }
+  double cost() const { return prediction_.cost(problem_.cost()); }
   // Parts of it at once, without a limit:
   void relinearize_all(UpdateReport& report);
   bool bring_factor_up_to_date(UpdateReport& report);
@@ -182,10 +182,10 @@ class Engine {
   std::shared_ptr<Rescuer> rescuer_;
   Problem problem_;
   Factorization factorization_;
-  Outlook outlook_;
+  CostPrediction prediction_;
   Solution solution_;
   Pace pace_;
-  Followers followers_;
+  PendingPoses pending_;
   /// The estimate as it is to be seen while what the engine has is not proven.
   std::optional<Estimate> shown_;
   AnswersKept answers_;

@@ -25,7 +25,7 @@ Engine::Next Engine::follow_all() {
     problem_.follow_and_touch(static_cast<int>(solution_.next));
   }
   problem_.clear_values();
-  outlook_.begin_anew();
+  prediction_.begin_anew();
   return Stage::frame_all;
 }
 
@@ -72,8 +72,8 @@ Engine::Stage Engine::diverged(UpdateReport& report) {
   }
   solution_.factors = factors;
   solution_.damping.begin();
-  outlook_.expect_the_worst();
-  followers_.place(problem_);
+  prediction_.forget();
+  pending_.place(problem_);
   return begin_relinearizing_all();
 }
 

@@ -39,8 +39,8 @@ void Engine::solve(double max_seconds, UpdateReport& report) {
   while (busy() || begin(report)) {
     if (!go_on(report)) break;
     const bool more = problem_.waiting() > 0;
-    followers_.place(problem_);
-    followers_.clear();
+    pending_.place(problem_);
+    pending_.clear();
     problem_.admit_waiting();
     if (!more || !pace_.allows(Work::order, 1.0)) break;
   }
@@ -204,7 +204,7 @@ Engine::Stage Engine::factorized(UpdateReport& report) {
       if (solution_.rounds == 0 && problem_.change.sources.list().size() < kMostSources &&
           negligible())
         return end();
-      solution_.tolerance = outlook_.tolerance(cost(), problem_.live_factors());
+      solution_.tolerance = prediction_.tolerance(cost(), problem_.live_factors());
       break;
     case Damping::Stage::begun:
       problem_.states.remember();
@@ -227,7 +227,7 @@ bool Engine::negligible() {
   const std::vector<std::int32_t>& sources = problem_.change.sources.list();
   for (const std::int32_t v : sources) problem_.right_hand_side(v);
   const double gain = problem_.substitution.decrement(problem_.system, problem_.tree, sources);
-  return gain <= std::min(settings_.significance, outlook_.negligible(cost()));
+  return gain <= std::min(settings_.significance, prediction_.negligible(cost()));
 }
 
 /// g of all sources. False if there was no time for that.
@@ -250,7 +250,7 @@ Engine::Next Engine::set_right_hand_side() {
 Engine::Next Engine::climb() {
   Substitution& substitution = problem_.substitution;
   if (!substitution.climb(problem_.system, problem_.tree, pace_)) return std::nullopt;
-  outlook_.step(substitution.climbed());
+  prediction_.step(substitution.climbed());
   problem_.change.sources.clear();
   solution_.unproven = true;
   if (!shown_) pace_.keep_free(kCopySeconds * problem_.states.size());
@@ -297,8 +297,8 @@ Engine::Stage Engine::look(UpdateReport& report) {
   const bool anyway = std::exchange(problem_.change.must_look, false) ||
                       problem_.live_factors() <= kFew || last || solution_.rounds > 0;
   ++solution_.rounds;
-  if (!anyway && outlook_.is_sure(cost())) return end();
-  outlook_.begin_evaluation(problem_.cost());
+  if (!anyway && prediction_.is_sure(cost())) return end();
+  prediction_.begin_evaluation(problem_.cost());
   solution_.looked_at = problem_.take_moved_factors();
   return Stage::evaluate;
 }
@@ -320,12 +320,12 @@ Engine::Next Engine::evaluate(UpdateReport& report) {
     problem_.evaluate(together);
     for (const std::int32_t f : together) {
       if (problem_.others() > 0 && problem_.is_other(f))
-        outlook_.note_mismatch(models.mismatch(f, graph(), problem_.states));
+        prediction_.note_mismatch(models.mismatch(f, graph(), problem_.states));
     }
     solution_.next = end;
   }
   const double cost = problem_.cost();
-  outlook_.end_evaluation(cost);
+  prediction_.end_evaluation(cost);
   if (solution_.damping.stage() == Damping::Stage::last) return end();
   // Negated, so that what is not a number is bad too.
   if (!(cost <= 2.0 * solution_.before + problem_.rounding())) return diverged(report);
@@ -337,7 +337,7 @@ Engine::Next Engine::evaluate(UpdateReport& report) {
 /// would go back to.
 void Engine::prove() {
   hide_unproven();
-  followers_.place(problem_);
+  pending_.place(problem_);
   problem_.states.remember();
 }
 
@@ -381,7 +381,7 @@ Engine::Next Engine::decrement(UpdateReport& report) {
 Engine::Stage Engine::improve(UpdateReport& report) {
   const int looked_at = static_cast<int>(solution_.looked_at.size());
   const bool poses_alone = problem_.others() == 0 && problem_.live_factors() > kFew;
-  const Outlook::Judgement judgement = outlook_.judge(
+  const CostPrediction::Judgement judgement = prediction_.judge(
       problem_.substitution.climbed(), problem_.cost(), problem_.rounding(), poses_alone);
   report.owed = 0;
   if (judgement.is_enough) return Stage::set_aside;

@@ -160,7 +160,7 @@ class CAIRN_API Graph {
   /// The factor as a value, its variables by id.
   Factor factor(int position) const;
   /// Positions of all factors on a variable, rising. Takes time in proportion to the whole graph;
-  /// see `factors_by_variable` for all variables at once.
+  /// see `FactorsByVariable` for all variables at once.
   std::vector<int> factors_of(int variable) const;
   std::span<const std::int32_t> factor_variables(int position) const;
   std::span<const double> measurement(int position) const;
@@ -245,8 +245,5 @@ CAIRN_API std::vector<double> squared_norms(const Graph& graph);
 
 /// Σ ρ(‖r‖²) at the graph's states: chi2 as it is stated everywhere in cairn, without a half.
 CAIRN_API double chi2(const Graph& graph);
-
-/// By variable, the positions of the factors on it, rising.
-CAIRN_API std::vector<std::vector<int>> factors_by_variable(const Graph& graph);
 
 }  // namespace cairn

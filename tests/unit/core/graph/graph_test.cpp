@@ -19,6 +19,7 @@
 
 #include <Eigen/Core>
 
+#include "cairn/graph/factors_by_variable.hpp"
 #include "cairn/lie/se2.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/types/define_variable.hpp"
@@ -430,7 +431,9 @@ TEST_F(GraphTest, TakesVariablesAndFactorsAsValues) {
   EXPECT_THAT(variable.state, ElementsAre(1, 0, 0));
   EXPECT_EQ(variable.id, 20);
   EXPECT_THAT(graph_.factors_of(1), ElementsAre(0));
-  EXPECT_THAT(factors_by_variable(graph_), ElementsAre(ElementsAre(0), ElementsAre(0)));
+  const FactorsByVariable factors(graph_);
+  EXPECT_THAT(factors[0], ElementsAre(0));
+  EXPECT_THAT(factors[1], ElementsAre(0));
   EXPECT_THAT(refusal([&] {
                 graph_.add(Factor{types_.relative_pose, {10, 30}, {1, 2, 0.5}, kUnit});
               }),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "outlook.hpp"
+#include "cost_prediction.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -33,37 +33,38 @@ constexpr double kMismatch = 0.05;
 
 }  // namespace
 
-double Outlook::cost(double evaluated) const { return std::max(evaluated - gained_, 0.0); }
+double CostPrediction::cost(double evaluated) const { return std::max(evaluated - gained_, 0.0); }
 
-double Outlook::negligible(double cost) const { return kEnough * accuracy_ * cost; }
+double CostPrediction::negligible(double cost) const { return kEnough * accuracy_ * cost; }
 
-double Outlook::tolerance(double cost, int factors) const {
+double CostPrediction::tolerance(double cost, int factors) const {
   return kStepShare * accuracy_ * cost / std::max(factors, 1);
 }
 
-bool Outlook::is_sure(double cost) const {
+bool CostPrediction::is_sure(double cost) const {
   const double allowed = accuracy_ * cost;
   return left_share_ * gained_ <= kLook * allowed && decrease_ <= kFar * allowed;
 }
 
-void Outlook::begin_evaluation(double evaluated) {
+void CostPrediction::begin_evaluation(double evaluated) {
   expected_ = cost(evaluated);
   looked_at_ = std::exchange(gained_, 0.0);
   square_ = 0.0;
   compared_ = 0;
 }
 
-void Outlook::note_mismatch(double mismatch) {
+void CostPrediction::note_mismatch(double mismatch) {
   square_ += mismatch * mismatch;
   ++compared_;
 }
 
-void Outlook::end_evaluation(double cost) {
+void CostPrediction::end_evaluation(double cost) {
   mismatch_ = compared_ > 0 ? std::sqrt(square_ / compared_) : 0.0;
   shortfall_ = cost - expected_;
 }
 
-Outlook::Judgement Outlook::judge(double left, double cost, double rounding, bool poses_alone) {
+CostPrediction::Judgement CostPrediction::judge(double left, double cost, double rounding,
+                                                bool poses_alone) {
   left = std::min(left, cost);  // more is rounding: chi2 is not negative
   const double allowed = accuracy_ * cost + rounding;
   const double likely = poses_alone ? std::min(left, kCaution * std::abs(shortfall_)) : left;

@@ -9,10 +9,10 @@ namespace cairn::incremental {
 /// Steps lower the cost by gᵀH⁻¹g each if the models are right. By how much they were wrong is seen
 /// when the factors are evaluated; the share of it that was left to gain is what is expected to be
 /// left the next time.
-class Outlook {
+class CostPrediction {
  public:
   /// What is allowed to be left: a fraction of the cost.
-  explicit Outlook(double accuracy) : accuracy_(accuracy) {}
+  explicit CostPrediction(double accuracy) : accuracy_(accuracy) {}
 
   /// A step is taken that lowers the cost by so much, by the models.
   void step(double decrease) {
@@ -38,7 +38,7 @@ class Outlook {
   /// Everything is linearised, evaluated, here.
   void begin_anew() { gained_ = 0.0; }
   /// Nothing is known.
-  void expect_the_worst() { left_share_ = 1.0; }
+  void forget() { left_share_ = 1.0; }
 
   struct Judgement {
     double likely;    ///< what can still be gained
